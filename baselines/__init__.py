@@ -1,0 +1,1 @@
+"""Who drives: policies, controllers, learned agents, the benchmark and the command line."""

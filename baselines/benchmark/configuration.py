@@ -1,0 +1,145 @@
+"""``config.json``: what a results folder was made with, and the hash of everything in it that changes results."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import json
+import os
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from baselines.benchmark import metrics
+from baselines.benchmark.cells import ENVIRONMENT_IDS, Cell, family_cells, sensitivity_cells, table1_cells
+
+FILE_NAME = "config.json"
+EPISODES = {"truth": 100, "emulated": 100, "mask": 20}
+"""Episodes per cell of Table 1 unless told otherwise, by perception: a rendered episode costs far more."""
+
+_STUDY_PART = 5
+_PACKAGES = (
+    *("follow-env", "gymnasium", "matplotlib", "numpy", "opencv-python-headless"),
+    *("pybullet", "scipy", "tqdm"),
+)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Cells and seeds of a reproduction.
+
+    Attributes:
+        table: Cells of Table 1.
+        episodes: Episodes per cell of the table, by perception.
+        sensitivity: Cells of the sensitivity study; empty without the emulated perception.
+        family: Cells of the family of sensors; empty without the emulated perception.
+        study_episodes: Episodes per cell of the two studies.
+    """
+
+    table: tuple[Cell, ...]
+    episodes: Mapping[str, int]
+    sensitivity: tuple[Cell, ...]
+    family: tuple[Cell, ...]
+    study_episodes: int
+
+    @classmethod
+    def of(cls, perceptions: list[str], episodes: int | None, sensors: list[str]) -> Plan:
+        """The plan of the paper's table at the given perceptions.
+
+        Args:
+            perceptions: Names, in any order.
+            episodes: Episodes per cell; None takes EPISODES.
+            sensors: Names of the family of emulated sensors.
+        """
+        table = tuple(table1_cells(perceptions))
+        counts = {cell.perception: EPISODES[cell.perception] if episodes is None else episodes for cell in table}
+        studies = "emulated" in counts
+        return cls(
+            table=table,
+            episodes=counts,
+            sensitivity=tuple(sensitivity_cells()) if studies else (),
+            family=tuple(family_cells(sensors)) if studies else (),
+            study_episodes=max(2, counts["emulated"] // _STUDY_PART) if studies else 0,
+        )
+
+    def table_seeds(self, cell: Cell) -> range:
+        """Seeds of a cell of the table; calibration uses others."""
+        return range(self.episodes[cell.perception])
+
+    @property
+    def study_seeds(self) -> range:
+        """Seeds of the cells of the two studies: the table's first, so that what both need is played once."""
+        return range(self.study_episodes)
+
+    def tasks(self) -> list[tuple[Cell, int]]:
+        """Every cell and seed that is needed, each once, cells that share an environment one after another."""
+        wanted = [(cell, seed) for cell in self.table for seed in self.table_seeds(cell)]
+        wanted += [(cell, seed) for cell in (*self.sensitivity, *self.family) for seed in self.study_seeds]
+        return list(dict.fromkeys(wanted))
+
+
+def settings(plan: Plan, calibration: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything that changes an episode's result or says which cells there are; JSON-able.
+
+    Args:
+        plan: Cells to run.
+        calibration: Content of the calibration: sensors, noise covariances and how they were found.
+    """
+    return {
+        "benchmark": "table1",
+        "environments": ENVIRONMENT_IDS,
+        "cells": {
+            "table1": [cell.key for cell in plan.table],
+            "sensitivity": [cell.key for cell in plan.sensitivity],
+            "family": [cell.key for cell in plan.family],
+        },
+        "calibration": dict(calibration),
+        "columns": list(metrics.COLUMNS),
+    }
+
+
+def digest(settings: Mapping[str, Any]) -> str:
+    """SHA-256 of the settings in one canonical form, as hexadecimal text."""
+    canonical = json.dumps(settings, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(canonical.encode()).hexdigest()
+
+
+def document(plan: Plan, settings: Mapping[str, Any], folder: Path, jobs: int) -> str:
+    """Text of ``config.json``: the settings and their hash, and beside them, unhashed, how this run was made."""
+    content = {
+        "settings": settings,
+        "settings_sha256": digest(settings),
+        "seeds": {
+            **{f"table1/{perception}": list(range(count)) for perception, count in plan.episodes.items()},
+            "studies": list(plan.study_seeds),
+        },
+        "packages": {name: _version(name) for name in _PACKAGES},
+        "machine": {
+            "platform": platform.platform(),
+            "python": platform.python_version(),
+            "cpu": _cpu_model(),
+            "cpu_count": os.cpu_count(),
+        },
+        "jobs": jobs,
+        "folder": folder.name,
+        "started": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+    }
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+def _version(package: str) -> str | None:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def _cpu_model() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())

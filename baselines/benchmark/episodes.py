@@ -1,0 +1,101 @@
+"""One episode of a cell: the environment and the follower are made from the cell, played, and measured."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.benchmark.cells import Cell
+from baselines.benchmark.metrics import EpisodeMetrics, Row, quantile
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Wall-clock cost of the policy's step in one episode, s; kept apart from everything that must be reproducible."""
+
+    mean: float
+    p95: float
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """One finished episode.
+
+    Attributes:
+        row: Numbers by column name (``metrics.COLUMNS``).
+        curve: Cumulative absolute errors, shape (steps, 3), float64: time s, angle rad, distance m.
+        timing: Cost of the policy's step.
+    """
+
+    row: Row
+    curve: NDArray[np.float64]
+    timing: Timing
+
+
+EpisodeFunction = Callable[[Cell, int], Episode]
+"""Plays the episode of a cell and a seed; its result may depend on nothing else."""
+
+
+def play(env: gym.Env, policy: Any, cell: Cell, seed: int) -> Episode:
+    """Play one episode and measure it.
+
+    Every observation is scored, the one at reset and the last one included: the belief that the policy forms from an
+    observation is compared with the truth at the same instant.
+
+    Args:
+        env: The cell's environment.
+        policy: Follower with SB3's ``predict``; its state has ``estimate`` and ``measurement``.
+        cell: Names the row.
+        seed: Seed of the environment's reset.
+    """
+    metrics = EpisodeMetrics(cell, seed)
+    costs = []
+    state = None
+    terminated = truncated = False
+    observation, info = env.reset(seed=seed)
+    while True:
+        began = time.perf_counter()
+        action, state = policy.predict(
+            observation, state, episode_start=np.array([state is None]), deterministic=True
+        )
+        costs.append(time.perf_counter() - began)
+        metrics.record(info, state.estimate, state.measurement)
+        if terminated or truncated:
+            break
+        observation, _, terminated, truncated, info = env.step(action)
+    timing = Timing(mean=math.fsum(costs) / len(costs), p95=quantile(costs, 0.95))
+    return Episode(row=metrics.row(terminated), curve=metrics.curve(), timing=timing)
+
+
+class Player:
+    """Plays episodes of any cell and keeps the last environment, because cells that share one come one after another.
+
+    A player is sent to a worker process empty; each process makes its own environments.
+    """
+
+    def __init__(self) -> None:
+        self._env: gym.Env | None = None
+        self._key: Hashable = None
+
+    def __call__(self, cell: Cell, seed: int) -> Episode:
+        """Play the episode of this cell and seed; what was played before does not change it."""
+        from baselines.benchmark.calibration import environment, environment_key, follower
+
+        key = environment_key(cell)
+        if self._env is None or key != self._key:
+            self.close()
+            self._env, self._key = environment(cell), key
+        return play(self._env, follower(cell), cell, seed)
+
+    def close(self) -> None:
+        """Close the environment; calling it again does nothing."""
+        if self._env is not None:
+            self._env.close()
+            self._env = None

@@ -1,0 +1,114 @@
+"""Why a cell differs from the paper, in plain words that are derived from the measured numbers alone."""
+
+from __future__ import annotations
+
+from baselines.benchmark.statistics import PooledError, weighted_share
+from baselines.benchmark.table1 import PAPER_RMSE, UNITS, Table1, paper_ratio
+
+RATIO_TOLERANCE = 0.15
+"""A ratio agrees with the paper's when it lies within this share of it."""
+NAMES = {"none": "No filter", "kf": "KF", "akf": "AKF", "akf_cv": "augmented AKF"}
+HYPOTHESES = (("kf", "none"), ("akf", "kf"))
+"""(smaller, larger) RMSE, as the paper has them."""
+
+_ALPHA = 0.05
+_FEW_OUTLIERS = 0.2
+
+
+def number(value: float, quantity: str) -> str:
+    """A value in the quantity's unit, without the unit: four decimals of a rad, two of a cm."""
+    decimals = 4 if quantity == "angle" else 2
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"
+
+
+def within(ratio: float | None, paper: float | None) -> bool | None:
+    """Whether a ratio agrees with the paper's; None when there is nothing to compare."""
+    return None if ratio is None or paper is None else abs(ratio / paper - 1.0) <= RATIO_TOLERANCE
+
+
+def explain(table: Table1, perception: str, scene: str, quantity: str) -> str | None:
+    """What differs from the paper for one scene and quantity, and what in the numbers explains it.
+
+    Returns:
+        One paragraph, or None when both orders hold and both ratios agree.
+    """
+    verdicts = _verdicts(table, perception, scene, quantity)
+    if not verdicts:
+        return None
+    none = table.error(perception, scene, "none", quantity)
+    sentences = [f"{'; '.join(verdicts)}."]
+    if none.rmse > 0.0:
+        sentences += [_scale(none, scene, quantity), _bias_share(none, quantity)]
+    else:
+        sentences.append("No filter makes no error on perfect measurements, so a filter can only add its own.")
+    sentences += [
+        _filter_effect(table.error(perception, scene, estimator, quantity), none, estimator, quantity)
+        for estimator in ("kf", "akf")
+    ]
+    if none.rmse > 0.0:
+        sentences.append(_outliers(table, perception, scene, quantity))
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
+def _verdicts(table: Table1, perception: str, scene: str, quantity: str) -> list[str]:
+    verdicts = []
+    for smaller, larger in HYPOTHESES:
+        sign = table.difference(perception, scene, quantity, smaller, larger).sign
+        if sign >= 0:
+            outcome = "does not hold" if sign > 0 else "is undecided"
+            verdicts.append(f"{NAMES[smaller]} < {NAMES[larger]} {outcome}")
+    for estimator in ("kf", "akf"):
+        ratio, paper = table.ratio(perception, scene, quantity, estimator), paper_ratio(scene, quantity, estimator)
+        if within(ratio, paper) is False:
+            verdicts.append(f"the {NAMES[estimator]} ratio is {ratio:.2f} (paper {paper:.2f})")
+    return verdicts
+
+
+def _scale(none: PooledError, scene: str, quantity: str) -> str:
+    paper = PAPER_RMSE[scene, quantity, "none"]
+    if abs(none.rmse / paper - 1.0) <= RATIO_TOLERANCE:
+        return ""
+    unit = UNITS[quantity]
+    return f"No filter errs by {number(none.rmse, quantity)} {unit} here and by {number(paper, quantity)} {unit} there."
+
+
+def _bias_share(none: PooledError, quantity: str) -> str:
+    share = none.bias**2 / none.rmse**2
+    start = f"Bias ({number(none.bias, quantity)} {UNITS[quantity]}) makes {share:.0%} of No filter's squared error"
+    if share < 0.5:
+        return f"{start}, spread ({number(none.spread, quantity)} {UNITS[quantity]}) the rest."
+    return f"{start} and smoothing does not remove it: without any spread the ratio would still be {share**0.5:.2f}."
+
+
+def _filter_effect(error: PooledError, none: PooledError, estimator: str, quantity: str) -> str:
+    bias, spread = error.bias**2 - none.bias**2, error.spread**2 - none.spread**2
+    if bias > 0.0 > spread:
+        outcome = "more bias added than spread removed" if bias + spread > 0.0 else "more spread removed than bias added"
+    elif bias <= 0.0 < spread:
+        outcome = "more spread added than bias removed" if bias + spread > 0.0 else "more bias removed than spread added"
+    elif bias <= 0.0:
+        outcome = "both fall"
+    else:
+        outcome = "both grow"
+    return (
+        f"The {NAMES[estimator]} takes bias from {number(none.bias, quantity)} to {number(error.bias, quantity)} and "
+        f"spread from {number(none.spread, quantity)} to {number(error.spread, quantity)} {UNITS[quantity]}: {outcome}."
+    )
+
+
+def _outliers(table: Table1, perception: str, scene: str, quantity: str) -> str:
+    none_rows = table.cell(perception, scene, "none")
+    squares = table.error(perception, scene, "none", quantity).squares
+    share = weighted_share(none_rows, f"{quantity}_outlier_share") or 0.0
+    carried = weighted_share(none_rows, f"{quantity}_outlier_square_share", dict(enumerate(squares.tolist()))) or 0.0
+    inflated = weighted_share(table.cell(perception, scene, "akf"), f"{quantity}_inflated_share") or 0.0
+    text = (
+        f"Outliers (beyond three robust standard deviations) are {share:.1%} of No filter's errors "
+        f"and carry {carried:.0%} of its squared error"
+    )
+    if carried < _FEW_OUTLIERS:
+        text += ", which leaves the AKF little to reject"
+    text += f"; the AKF inflates {inflated:.1%} of the measurements"
+    if inflated > share + 2.0 * _ALPHA:
+        text += ", good ones among them"
+    return f"{text}."

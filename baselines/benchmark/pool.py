@@ -1,0 +1,144 @@
+"""Worker processes that play episodes: they cannot outlive their parent, and one that dies is noticed."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import threading
+import traceback
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+
+from baselines.benchmark.cells import Cell
+from baselines.benchmark.episodes import Episode, EpisodeFunction
+
+Task = tuple[Cell, int]
+
+
+class EpisodeError(RuntimeError):
+    """An episode could not be played to its end; the message names it and holds the traceback."""
+
+
+def play_all(episode: EpisodeFunction, tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Task, Episode]]:
+    """Play the tasks and yield each with its episode as soon as it is finished, in no particular order.
+
+    Args:
+        episode: Plays one task. With several jobs it must be picklable: a module's function, or an instance.
+        tasks: Cells and seeds; they are started in this order.
+        jobs: Number of processes; 1 plays in this one.
+
+    Raises:
+        EpisodeError: If a task raises or its worker process dies.
+    """
+    if jobs == 1 or len(tasks) < 2:
+        return _play_here(episode, tasks)
+    return _play_in_workers(episode, tasks, min(jobs, len(tasks)))
+
+
+def _play_here(episode: EpisodeFunction, tasks: Sequence[Task]) -> Iterator[tuple[Task, Episode]]:
+    for task in tasks:
+        try:
+            result = episode(*task)
+        except Exception as error:
+            raise EpisodeError(f"{_name(task)} failed:\n{traceback.format_exc()}") from error
+        yield task, result
+
+
+def _play_in_workers(
+    episode: EpisodeFunction, tasks: Sequence[Task], jobs: int
+) -> Iterator[tuple[Task, Episode]]:
+    waiting = deque(tasks)
+    playing: dict[Connection, Task] = {}
+    processes: dict[Connection, BaseProcess] = {}
+    try:
+        for _ in range(jobs):
+            connection, process = _start(episode)
+            processes[connection] = process
+            playing[connection] = waiting.popleft()
+            _hand_over(connection, playing[connection])
+        while playing:
+            for connection in wait(list(playing)):
+                assert isinstance(connection, Connection)
+                task = playing.pop(connection)
+                try:
+                    result = connection.recv()
+                except (EOFError, ConnectionResetError):
+                    processes[connection].join()
+                    code = processes[connection].exitcode
+                    raise EpisodeError(f"the worker process that played {_name(task)} died with code {code}") from None
+                if isinstance(result, _Failure):
+                    raise EpisodeError(f"{_name(task)} failed:\n{result.traceback}")
+                if waiting:
+                    playing[connection] = waiting.popleft()
+                    _hand_over(connection, playing[connection])
+                yield task, result
+    finally:
+        for process in processes.values():
+            process.terminate()
+        for connection, process in processes.items():
+            process.join()
+            connection.close()
+
+
+@dataclass(frozen=True)
+class _Failure:
+    """What a worker sends instead of an episode when the task raised."""
+
+    traceback: str
+
+
+def _start(episode: EpisodeFunction) -> tuple[Connection, BaseProcess]:
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_serve, args=(theirs, episode), daemon=True)
+    with _interrupts_ignored():
+        process.start()
+    theirs.close()
+    return ours, process
+
+
+def _hand_over(connection: Connection, task: Task) -> None:
+    """Send a task; a worker that has died is noticed where its answer is awaited."""
+    with contextlib.suppress(BrokenPipeError):
+        connection.send(task)
+
+
+@contextlib.contextmanager
+def _interrupts_ignored() -> Iterator[None]:
+    """A process started in here ignores Ctrl-C from its first instruction on: only the parent answers it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+def _serve(connection: Connection, episode: EpisodeFunction) -> None:
+    """A worker's life: receive a task, send its episode, until it is terminated or the parent is gone."""
+    threading.Thread(target=_exit_with_parent, daemon=True).start()
+    while True:
+        task = connection.recv()
+        try:
+            result: Episode | _Failure = episode(*task)
+        except Exception:
+            result = _Failure(traceback.format_exc())
+        connection.send(result)
+
+
+def _exit_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    wait([parent.sentinel])
+    os._exit(1)
+
+
+def _name(task: Task) -> str:
+    return f"the episode {task[0].key} with seed {task[1]}"

@@ -1,0 +1,166 @@
+"""`follow reproduce table1`: play what is missing, keep each episode, and write the tables and figures from the store."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from baselines.benchmark import configuration, figures, metrics, store
+from baselines.benchmark.cells import Cell
+from baselines.benchmark.configuration import Plan
+from baselines.benchmark.curves import CURVE_COLUMNS, curve_records
+from baselines.benchmark.episodes import Episode, EpisodeFunction
+from baselines.benchmark.files import Value, write_csv, write_text
+from baselines.benchmark.pool import play_all
+from baselines.benchmark.progress import progress
+from baselines.benchmark.report import report
+from baselines.benchmark.store import InputError, Store
+from baselines.benchmark.studies import FAMILY_COLUMNS, SENSITIVITY_COLUMNS, study_records
+from baselines.benchmark.table1 import COLUMNS, Table1
+
+FIGURES = "figures"
+_RESULTS = ("table1.csv", "table1.md", "episodes.csv", "sensitivity.csv", "family.csv", "curves.csv", "timing.csv")
+_TIMING_COLUMNS = ("cell", "seed", "policy_step_mean_s", "policy_step_p95_s")
+_DIGITS = 6
+
+
+class Interrupted(KeyboardInterrupt):
+    """The user stopped the run; the message says what was kept and how to go on."""
+
+
+def reproduce(
+    plan: Plan, calibration: Mapping[str, Any], episode: EpisodeFunction, out: Path, jobs: int, resume: bool
+) -> str:
+    """Play the plan's episodes and write every result into a folder.
+
+    Args:
+        plan: Cells and seeds.
+        calibration: Content of the calibration, part of the configuration's hash.
+        episode: Plays one cell and seed; picklable when several jobs are used.
+        out: Results folder; made when missing.
+        jobs: Number of processes. The results do not depend on it.
+        resume: Whether to go on with the episodes that the folder already holds.
+
+    Returns:
+        The report, ``table1.md`` without its figures.
+
+    Raises:
+        InputError: If the folder cannot be used; nothing in it has changed.
+        EpisodeError: If an episode fails; the finished ones are kept.
+        Interrupted: On Ctrl-C; the finished episodes are kept.
+    """
+    settings = configuration.settings(plan, calibration)
+    digest = configuration.digest(settings)
+    _claim(out, digest)
+    with Store(out, digest) as episodes:
+        if len(episodes) and not resume:
+            raise InputError(
+                f"{out} already holds {len(episodes)} episodes of this configuration: "
+                "go on with --resume, or choose another folder with --out."
+            )
+        with _writable(out):
+            write_text(out / configuration.FILE_NAME, configuration.document(plan, settings, out, jobs))
+            (out / FIGURES).mkdir(exist_ok=True)
+        _play_missing(plan, episode, episodes, out, jobs)
+        with _writable(out):
+            return _write_results(plan, episodes, out)
+
+
+def _claim(out: Path, digest: str) -> None:
+    """Make the folder, and refuse one whose results would be lost."""
+    with _writable(out):
+        out.mkdir(parents=True, exist_ok=True)
+        results = [name for name in _RESULTS if (out / name).exists()]
+        stored = (out / store.FILE_NAME).exists()
+        config = out / configuration.FILE_NAME
+        text = config.read_text(encoding="utf-8") if config.exists() else None
+    if results and not stored:
+        raise InputError(
+            f"{out} holds {results[0]} but not the episodes it was made from ({store.FILE_NAME}), so it would be lost: "
+            "choose another folder with --out."
+        )
+    if text is not None and (found := _digest_in(text)) != digest:
+        if results or stored:
+            raise InputError(
+                f"{out} holds results of another configuration ({found[:12]}, this one is {digest[:12]}): "
+                "choose another folder with --out."
+            )
+
+
+def _digest_in(text: str) -> str:
+    """The hash that a ``config.json`` names, or a word that equals no hash."""
+    try:
+        return str(json.loads(text)["settings_sha256"])
+    except (ValueError, KeyError, TypeError):
+        return "unreadable"
+
+
+@contextlib.contextmanager
+def _writable(out: Path):  # type: ignore[no-untyped-def]
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"{out} cannot be written ({error.strerror or error}): make it a writable folder on a disk with space, "
+            "or choose another with --out."
+        ) from error
+
+
+def _play_missing(plan: Plan, episode: EpisodeFunction, episodes: Store, out: Path, jobs: int) -> None:
+    tasks = plan.tasks()
+    finished = episodes.finished()
+    missing = [(cell, seed) for cell, seed in tasks if (cell.key, seed) not in finished]
+    if not missing:
+        return
+    done = len(tasks) - len(missing)
+    kept = done
+    try:
+        with contextlib.closing(play_all(episode, missing, jobs)) as playing:
+            for (cell, seed), result in progress(playing, total=len(tasks), done=done):
+                episodes.add(cell, seed, result)
+                kept += 1
+    except KeyboardInterrupt:
+        raise Interrupted(
+            f"interrupted: {kept} of {len(tasks)} episodes are kept in {out}; the same command with --resume goes on."
+        ) from None
+
+
+def _write_results(plan: Plan, episodes: Store, out: Path) -> str:
+    """Every table and figure, from exactly the planned seeds, in the plan's order."""
+    table = {cell: [episodes.episode(cell, seed) for seed in plan.table_seeds(cell)] for cell in plan.table}
+    write_csv(out / "episodes.csv", metrics.COLUMNS, _rows(table))
+    write_csv(out / "timing.csv", _TIMING_COLUMNS, _timings(table))
+    curves = curve_records({cell: [played.curve for played in group] for cell, group in table.items()})
+    write_csv(out / "curves.csv", CURVE_COLUMNS, curves, _DIGITS)
+    drawn = figures.draw_curves(curves, out / FIGURES)
+    for name, cells, columns, draw in (
+        ("sensitivity", plan.sensitivity, SENSITIVITY_COLUMNS, figures.draw_sensitivity),
+        ("family", plan.family, FAMILY_COLUMNS, figures.draw_family),
+    ):
+        if cells:
+            study = {cell: [episodes.episode(cell, seed) for seed in plan.study_seeds] for cell in cells}
+            write_csv(out / f"{name}_episodes.csv", metrics.COLUMNS, _rows(study))
+            records = study_records({cell: [played.row for played in group] for cell, group in study.items()})
+            write_csv(out / f"{name}.csv", columns, records, _DIGITS)
+            drawn.append(draw(records, out / FIGURES))
+    measured = Table1({cell: [played.row for played in group] for cell, group in table.items()})
+    write_csv(out / "table1.csv", COLUMNS, measured.records(), _DIGITS)
+    text = report(measured)
+    pictures = "\n\n".join(f"![{path.stem.replace('_', ' ')}]({FIGURES}/{path.name})" for path in drawn)
+    write_text(out / "table1.md", f"{text}\n## Figures\n\n{pictures}\n")
+    return text
+
+
+def _rows(played: Mapping[Cell, Sequence[Episode]]) -> list[metrics.Row]:
+    return [episode.row for group in played.values() for episode in group]
+
+
+def _timings(played: Mapping[Cell, Sequence[Episode]]) -> list[dict[str, Value]]:
+    return [
+        dict(zip(_TIMING_COLUMNS, (cell.key, seed, episode.timing.mean, episode.timing.p95), strict=True))
+        for cell, group in played.items()
+        for seed, episode in enumerate(group)
+    ]

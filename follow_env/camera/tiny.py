@@ -1,0 +1,110 @@
+"""`TinyRenderer`: PyBullet's software rasteriser behind the `Renderer` interface.
+
+It draws in a client of its own, so that the physics client steps without visual bodies. One directional light stands
+for the scene's lamps; its strength follows the lamps' falloff at the place the camera looks at.
+"""
+
+import math
+
+import numpy as np
+import pybullet
+
+from follow_env.camera.frame import RGBDFrame
+from follow_env.camera.pinhole import CameraPose, PinholeCamera
+from follow_env.person.body import segments
+from follow_env.person.gait import SegmentPose
+from follow_env.scene import Box, Cylinder, Material, Scene
+
+LIGHT_DIRECTION = (0.25, 0.45, 1.0)
+
+
+class TinyRenderer:
+    """Draws `scene` and a person in `clothes` with PyBullet's TinyRenderer, without shadows."""
+
+    def __init__(self, scene: Scene, camera: PinholeCamera, clothes: str) -> None:
+        self._scene, self._camera = scene, camera
+        self._client = pybullet.connect(pybullet.DIRECT)
+        x0, x1, y0, y1 = scene.bounds
+        floor = Box((0.5 * (x0 + x1), 0.5 * (y0 + y1), -0.05), (x1 - x0, y1 - y0, 0.1), scene.floor)
+        for primitive in (floor, *scene.primitives):
+            self._add_primitive(primitive)
+        self._person = [self._add_mesh(*s.mesh(), Material(s.colour, 0.0)) for s in segments(clothes)]
+        self._projection = camera.projection_matrix()
+
+    def render(self, camera: CameraPose, person: list[SegmentPose]) -> RGBDFrame:
+        """Return the frame seen from `camera` with the person's segments at `person`."""
+        client, config = self._client, self._camera.config
+        for body, (position, orientation) in zip(self._person, person, strict=True):
+            pybullet.resetBasePositionAndOrientation(body, position, orientation, physicsClientId=client)
+        ahead = (camera.x + 2.0 * math.cos(camera.yaw), camera.y + 2.0 * math.sin(camera.yaw))
+        lamps = self._scene.illumination(*ahead)
+        _, _, rgba, buffer, segmentation = pybullet.getCameraImage(
+            config.width,
+            config.height,
+            self._camera.view_matrix(camera),
+            self._projection,
+            lightDirection=LIGHT_DIRECTION,
+            lightColor=(1.0, 1.0, 1.0),
+            lightDistance=10.0,
+            shadow=0,
+            lightAmbientCoeff=self._scene.ambient + 0.30 * min(lamps, 1.3),
+            lightDiffuseCoeff=0.60 * min(lamps, 1.3),
+            lightSpecularCoeff=0.02,
+            renderer=pybullet.ER_TINY_RENDERER,
+            physicsClientId=client,
+        )
+        shape = (config.height, config.width)
+        rgb = np.ascontiguousarray(np.asarray(rgba, np.uint8).reshape(*shape, 4)[:, :, :3])
+        z_buffer = np.asarray(buffer, np.float64).reshape(shape)
+        depth = config.far * config.near / (config.far - (config.far - config.near) * z_buffer)
+        ids = (np.asarray(segmentation).reshape(shape) >= self._person[0]).astype(np.uint8)
+        return RGBDFrame(rgb, depth.astype(np.float32), ids)
+
+    def close(self) -> None:
+        """Disconnect from PyBullet; a second call does nothing."""
+        if self._client >= 0:
+            pybullet.disconnect(self._client)
+            self._client = -1
+
+    def _add_primitive(self, primitive: Box | Cylinder) -> None:
+        client, colour = self._client, (*primitive.material.colour, 1.0)
+        if isinstance(primitive, Box):
+            shape = pybullet.createVisualShape(
+                pybullet.GEOM_BOX,
+                halfExtents=[0.5 * s for s in primitive.size],
+                rgbaColor=colour,
+                specularColor=(0.0, 0.0, 0.0),
+                physicsClientId=client,
+            )
+            yaw = primitive.yaw
+        else:
+            shape = pybullet.createVisualShape(
+                pybullet.GEOM_CYLINDER,
+                radius=primitive.radius,
+                length=primitive.height,
+                rgbaColor=colour,
+                specularColor=(0.0, 0.0, 0.0),
+                physicsClientId=client,
+            )
+            yaw = 0.0
+        pybullet.createMultiBody(
+            0,
+            -1,
+            shape,
+            primitive.centre,
+            (0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw)),
+            physicsClientId=client,
+        )
+
+    def _add_mesh(self, vertices: np.ndarray, normals: np.ndarray, indices: np.ndarray, material: Material) -> int:
+        shape = pybullet.createVisualShape(
+            pybullet.GEOM_MESH,
+            vertices=vertices.tolist(),
+            indices=indices.tolist(),
+            normals=normals.tolist(),
+            uvs=np.zeros((len(vertices), 2)).tolist(),
+            rgbaColor=(*material.colour, 1.0),
+            specularColor=(0.0, 0.0, 0.0),
+            physicsClientId=self._client,
+        )
+        return pybullet.createMultiBody(0, -1, shape, physicsClientId=self._client)

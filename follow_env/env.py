@@ -1,0 +1,399 @@
+"""`FollowEnv`: composes world, person, camera and sensors; owns the clock and the one random generator."""
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from follow_env.camera import CameraPose, PinholeCamera, Renderer, RGBDFrame, make_renderer
+from follow_env.camera.depth import DepthSensor
+from follow_env.config import CameraConfig, RobotConfig, SensorConfig, build, choose, sensor_config
+from follow_env.measurement import GaussMarkov, MeasurementModel
+from follow_env.person import gait
+from follow_env.person.body import CLOTHES
+from follow_env.physics import PERSON_RADIUS, PHYSICS_HZ, World
+from follow_env.reward import SET_POINT, reward_terms
+from follow_env.routes import ROUTES, Route, make_route
+from follow_env.scenes import make_scene
+from follow_env.view import Dashboard, import_pygame, show_window
+
+OBSERVATIONS = ("measurement", "state", "rgbd", "rgbd_box", "rgbd_uint8")
+ACTIONS = ("twist", "wheels")
+MAX_DISTANCE = 20.0
+LOST_AFTER = 5.0
+"""The episode ends when the person was out of view for longer than this, s."""
+BAND = (1.0, 2.0, math.radians(30.0))
+"""In band: distance between the first two (m) and |bearing| up to the third (rad)."""
+
+
+class FollowEnv(gymnasium.Env):
+    """A differential-drive robot with an RGB-D camera follows a walking person.
+
+    Frames are REP-103: robot x forward, y left, origin at the axle's middle; bearing positive to the left. `bearing`
+    (rad) and `distance` (m, along x) are those of the person's pelvis axis.
+
+    **Action** `Box(-1, 1, (2,))`: `action="twist"` is (v, omega) as shares of the robot's `max_speed` and
+    `max_yaw_rate`; `"wheels"` is (left, right) as shares of `max_wheel_speed`. Larger values are clipped.
+
+    **Observation** by `obs`:
+
+    - `"measurement"` float32 (8,): bearing, distance, validity (1 or 0), age of the latest measurement in s, odometry
+      v and omega, last action. Without a new measurement bearing, distance and validity are 0.
+    - `"state"` float32 (8,): true bearing, true distance, person's velocity in the robot frame (x, y), odometry v and
+      omega, last action.
+    - `"rgbd"` Dict: `rgb` uint8 (H, W, 3), `depth` float32 (H, W) m (0 = no reading), `twist` float32 (2,) odometry.
+    - `"rgbd_box"`: the same and `box` float32 (4,) = (u0, v0, u1, v1) px, the person's visible box with the stated
+      jitter; zeros when the person is not detected. The `mask` rung of the benchmark.
+    - `"rgbd_uint8"`: uint8 (H, W, 4), the depth as 255 (1 - z / 8 m), 0 = no reading or beyond; the metric depth
+      stays in `info["depth"]`.
+
+    **Reward**: sum of the bounded terms in `info["rewards"]` (`follow_env.reward`).
+
+    **Ends**: a collision or a person out of view for more than 5 s terminates; the route's end truncates.
+
+    Args:
+        scene: `"corridor"` or `"indoor"`.
+        obs: see above.
+        action: `"twist"` or `"wheels"`.
+        route: `"paper"` (12 m in 14 s, turns up to 50 deg), `"straight"` or `"standing"`.
+        sensor: `"xtion"`, `"ideal"` or a mapping of `SensorConfig` settings, e.g. `{"measurement": {"miss_share": .1}}`.
+        camera: mapping of `CameraConfig` settings, e.g. `{"width": 320, "height": 240}`.
+        robot: mapping of `RobotConfig` settings.
+        renderer: `"tiny"` (PyBullet's software renderer).
+        control_hz: control and camera rate; divides 240.
+        latency_s: age of what is observed, s; a multiple of the control period.
+        person: clothes of the person, a key of `follow_env.person.body.CLOTHES`.
+        render_mode: None, `"rgb_array"` (dashboard), `"rgbd_tuple"` ((rgb, depth) of the robot) or `"human"`.
+
+    Raises:
+        ValueError: for an unknown name or an impossible value, in one sentence.
+    """
+
+    metadata = {"render_modes": ["rgb_array", "rgbd_tuple", "human"], "render_fps": 30}
+
+    def __init__(
+        self,
+        scene: str = "corridor",
+        obs: str = "measurement",
+        action: str = "twist",
+        route: str = "paper",
+        sensor: str | Mapping[str, Any] | SensorConfig = "xtion",
+        camera: Mapping[str, Any] | None = None,
+        robot: Mapping[str, Any] | None = None,
+        renderer: str = "tiny",
+        control_hz: int = 30,
+        latency_s: float = 0.0,
+        person: str = "blue",
+        render_mode: str | None = None,
+    ) -> None:
+        if not isinstance(control_hz, int) or control_hz <= 0 or PHYSICS_HZ % control_hz:
+            raise ValueError(
+                f"control_hz is {control_hz!r}; expected a whole number that divides the physics rate {PHYSICS_HZ}, "
+                "for example 30"
+            )
+        self._obs = choose("obs", obs, OBSERVATIONS)
+        self._action = choose("action", action, ACTIONS)
+        self._route_name = choose("route", route, ROUTES)
+        self._renderer_name = choose("renderer", renderer, ("tiny",))
+        self._person = choose("person", person, CLOTHES)
+        self.render_mode = (
+            None if render_mode is None else choose("render_mode", render_mode, self.metadata["render_modes"])
+        )
+        if self.render_mode == "human":
+            import_pygame()
+        self.dt = 1.0 / control_hz
+        self.metadata = {**self.metadata, "render_fps": control_hz}
+        self._substeps = PHYSICS_HZ // control_hz
+        self._delay = round(latency_s * control_hz) if math.isfinite(latency_s) else -1
+        if self._delay < 0 or abs(self._delay * self.dt - latency_s) > 1e-6:
+            raise ValueError(
+                f"latency_s is {latency_s!r}; expected a multiple >= 0 of the control period {self.dt:.4f} s"
+            )
+        self.robot_config = build("robot", RobotConfig(), robot)
+        self.camera = PinholeCamera(build("camera", CameraConfig(), camera))
+        self._sensor = sensor_config(sensor)
+        self._scene = make_scene(scene)
+        self._world: World | None = None
+        self._renderer: Renderer | None = None
+        self._dashboard: Dashboard | None = None
+        self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self.observation_space = self._make_observation_space()
+        self._route: Route | None = None
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Start an episode.
+
+        Args:
+            seed: seeds the environment's generator; one seed gives one episode, bit for bit.
+            options: `route` (name), `robot_pose` ((x, y, yaw), m and rad), `person` (clothes), `sensor`: for this
+                episode only.
+        """
+        super().reset(seed=seed)
+        options = options or {}
+        for key in options:
+            choose("reset option", key, ("route", "robot_pose", "person", "sensor"))
+        if self._world is None:
+            self._world = World(self._scene, self.robot_config)
+        self._set_up_sensors(sensor_config(options["sensor"]) if "sensor" in options else self._sensor)
+        self._dress(choose("person", options.get("person", self._person), CLOTHES))
+
+        x, y, yaw = self._scene.start
+        y += float(self.np_random.uniform(-1.0, 1.0)) * self._scene.start_width
+        ahead = (x + SET_POINT * math.cos(yaw), y + SET_POINT * math.sin(yaw), yaw)
+        self._route = make_route(options.get("route", self._route_name), self._scene, ahead, self.np_random)
+        robot_pose = tuple(float(value) for value in options.get("robot_pose", (x, y, yaw)))
+        if len(robot_pose) != 3 or not all(map(math.isfinite, robot_pose)):
+            raise ValueError(f"robot_pose is {options['robot_pose']!r}; expected three finite numbers (x, y, yaw)")
+        self._world.reset(robot_pose, self._route.pose(0.0))
+
+        self._steps = 0
+        self._twist = (0.0, 0.0)
+        self._last_action = np.zeros(2, np.float32)
+        self._out_of_view = self._longest_out_of_view = 0
+        self._in_band = 0
+        self._last_measured: float | None = None
+        if self._dashboard is not None:
+            self._dashboard.reset()
+        self._look()
+        self._rewards = dict.fromkeys(reward_terms(0.0, SET_POINT, True, 0.0, False), 0.0)
+        self._saturated = False
+        self._collision = "none"
+        observation = self._observe()
+        info = self._info()
+        self._show(info)
+        return observation, info
+
+    def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Drive for one control period; see the class for action, observation, reward and ends."""
+        if self._route is None or self._world is None:
+            raise gymnasium.error.ResetNeeded("step() was called before reset(); call reset() first")
+        command = np.asarray(action, np.float64)
+        if command.shape != (2,):
+            raise ValueError(f"the action has shape {command.shape}; expected (2,): {self._action} in [-1, 1]")
+        first, second = float(command[0]), float(command[1])
+        if not (math.isfinite(first) and math.isfinite(second)):
+            raise ValueError(f"the action is {[first, second]}; expected two finite numbers in [-1, 1]")
+        first, second = min(max(first, -1.0), 1.0), min(max(second, -1.0), 1.0)
+        robot = self.robot_config
+        if self._action == "twist":
+            wheels = self._world.drive.wheels(first * robot.max_speed, second * robot.max_yaw_rate)
+        else:
+            wheels = first * robot.max_wheel_speed, second * robot.max_wheel_speed
+
+        self._steps += 1
+        self._world.place_person(self._route.pose(self.time))
+        self._twist = self._world.step(*wheels, self._substeps)
+        self._saturated = max(abs(a - b) for a, b in zip(self._world.wheel_command, wheels, strict=True)) > 1e-9
+        self._collision = self._world.collision()
+        self._look()
+        effort = max(abs(first - float(self._last_action[0])), abs(second - float(self._last_action[1])))
+        self._last_action = np.array((first, second), np.float32)
+        collided = self._collision != "none"
+        self._rewards = reward_terms(self._bearing, self._distance, self._visible, effort, collided)
+        terminated = collided or self._out_of_view * self.dt > LOST_AFTER
+        truncated = not terminated and self.time >= self._route.duration - 1e-9
+        observation = self._observe()
+        info = self._info()
+        self._show(info)
+        return observation, sum(self._rewards.values()), terminated, truncated, info
+
+    def render(self) -> Any:
+        """Return what `render_mode` asks for: the dashboard (H, W, 3) uint8, or (rgb, depth) of the robot's camera."""
+        if self.render_mode is None or self._route is None:
+            raise gymnasium.error.ResetNeeded(
+                "nothing to render; make the environment with render_mode='rgb_array' and call reset() first"
+            )
+        if self.render_mode == "rgbd_tuple":
+            frame = self.frame()
+            return frame.rgb, frame.depth
+        assert self._dashboard is not None
+        return self._dashboard.image()
+
+    def frame(self) -> RGBDFrame:
+        """Return the camera's picture of this moment without sensor errors: the truth, for pictures and tests."""
+        assert self._route is not None and self._world is not None
+        if self._renderer is None:
+            self._renderer = make_renderer(self._renderer_name, self._scene, self.camera, self._dressed)
+        x, y, heading = self._route.pose(self.time)
+        person = gait.pose(x, y, heading, self._route.walked(self.time), self._route.speed(self.time))
+        return self._renderer.render(self.camera_pose(), person)
+
+    def camera_pose(self) -> CameraPose:
+        """Pose of the camera in the world frame."""
+        x, y, yaw = self._robot_pose
+        forward = self.robot_config.camera_forward
+        return CameraPose(
+            x + forward * math.cos(yaw), y + forward * math.sin(yaw), self.robot_config.camera_height, yaw
+        )
+
+    @property
+    def time(self) -> float:
+        """Seconds since the episode's start."""
+        return self._steps * self.dt
+
+    def close(self) -> None:
+        """Free the physics and the renderer; a second call does nothing."""
+        for part in (self._world, self._renderer):
+            if part is not None:
+                part.close()
+        self._world = self._renderer = self._route = None
+
+    def _make_observation_space(self) -> spaces.Space:
+        height, width = self.camera.height, self.camera.width
+        robot = self.robot_config
+        twist = (1.5 * robot.max_wheel_speed, 3.0 * robot.max_wheel_speed / robot.track_width)
+        if self._obs in ("measurement", "state"):
+            own = (*twist, 1.0, 1.0)
+            if self._obs == "measurement":
+                high, low = (math.pi, MAX_DISTANCE, 1.0, 600.0, *own), (-math.pi, 0.0, 0.0, 0.0)
+            else:
+                high, low = (math.pi, MAX_DISTANCE, 5.0, 5.0, *own), (-math.pi, -MAX_DISTANCE, -5.0, -5.0)
+            return spaces.Box(
+                np.array((*low, *(-value for value in own)), np.float32), np.array(high, np.float32), dtype=np.float32
+            )
+        if self._obs == "rgbd_uint8":
+            return spaces.Box(0, 255, (height, width, 4), np.uint8)
+        parts: dict[str, spaces.Space] = {
+            "rgb": spaces.Box(0, 255, (height, width, 3), np.uint8),
+            "depth": spaces.Box(0.0, self.camera.config.far, (height, width), np.float32),
+            "twist": spaces.Box(-np.array(twist, np.float32), np.array(twist, np.float32), dtype=np.float32),
+        }
+        if self._obs == "rgbd_box":
+            parts["box"] = spaces.Box(0.0, np.array((width, height, width, height), np.float32), (4,), np.float32)
+        return spaces.Dict(parts)
+
+    def _set_up_sensors(self, sensor: SensorConfig) -> None:
+        self._measurement = MeasurementModel(sensor.measurement, self.dt)
+        self._depth_sensor = DepthSensor(sensor.depth, self.camera.hfov)
+        self._box_config = sensor.box
+        self._box_error = GaussMarkov(4, sensor.box.correlation_s, self.dt)
+        self._queue: deque[Any] = deque()
+
+    def _dress(self, clothes: str) -> None:
+        if self._renderer is not None and clothes != self._dressed:
+            self._renderer.close()
+            self._renderer = None
+        self._dressed = clothes
+
+    def _look(self) -> None:
+        """Update the truth: poses, bearing, distance, visibility and what is counted from them."""
+        assert self._route is not None and self._world is not None
+        t = self.time
+        self._robot_pose = self._world.robot_pose()
+        self._person_pose = self._route.pose(t)
+        self._person_velocity = self._route.velocity(t)
+        x, y, yaw = self._robot_pose
+        dx, dy = self._person_pose[0] - x, self._person_pose[1] - y
+        cosine, sine = math.cos(yaw), math.sin(yaw)
+        self._distance, left = cosine * dx + sine * dy, -sine * dx + cosine * dy
+        self._bearing = math.atan2(left, self._distance)
+        self._surface_distance = max(math.sqrt(dx * dx + dy * dy) - self.robot_config.hull_radius - PERSON_RADIUS, 0.0)
+        depth = self._distance - self.robot_config.camera_forward
+        in_field = depth > 0.3 and abs(left) <= depth * math.tan(0.5 * self.camera.hfov)
+        eye = self.camera_pose()
+        self._visible = in_field and self._world.line_of_sight(
+            (eye.x, eye.y, eye.z), (self._person_pose[0], self._person_pose[1], 1.2)
+        )
+        self._out_of_view = 0 if self._visible else self._out_of_view + 1
+        self._longest_out_of_view = max(self._longest_out_of_view, self._out_of_view)
+        low, high, width = BAND
+        self._in_band += low <= self._distance <= high and abs(self._bearing) <= width
+
+    def _observe(self) -> Any:
+        """Return the observation, `latency_s` old in what was seen, current in odometry and action."""
+        own = (*self._twist, *(float(a) for a in self._last_action))
+        if self._obs == "state":
+            yaw = self._robot_pose[2]
+            (vx, vy), cosine, sine = self._person_velocity, math.cos(yaw), math.sin(yaw)
+            return np.array(
+                (self._bearing, self._distance, cosine * vx + sine * vy, cosine * vy - sine * vx, *own), np.float32
+            )
+        if self._obs == "measurement":
+            seen = self._delayed(
+                self._measurement.measure(self._bearing, self._distance, self._visible, self.np_random)
+            )
+            age = self._delay * self.dt
+            if seen is None:
+                since = 0.0 if self._last_measured is None else self._last_measured
+                return np.array((0.0, 0.0, 0.0, self.time - since, *own), np.float32)
+            self._last_measured = max(self.time - age, 0.0)
+            return np.array((seen[0], min(seen[1], MAX_DISTANCE), 1.0, age, *own), np.float32)
+        frame, box = self._delayed(self._sense())
+        self._observed: RGBDFrame = frame
+        if self._obs == "rgbd_uint8":
+            near = np.where((frame.depth > 0.0) & (frame.depth < 8.0), 255.0 * (1.0 - frame.depth / 8.0), 0.0)
+            return np.dstack((frame.rgb, near.astype(np.uint8)))
+        observation = {"rgb": frame.rgb, "depth": frame.depth, "twist": np.array(self._twist, np.float32)}
+        if self._obs == "rgbd_box":
+            observation["box"] = box
+        return observation
+
+    def _sense(self) -> tuple[RGBDFrame, np.ndarray]:
+        """Return the frame with sensor errors, and the person's jittered box (zeros when not detected)."""
+        truth = self.frame()
+        depth = self._depth_sensor.corrupt(truth.depth, self.np_random)
+        errors = self._box_error.step(self.np_random)
+        box = np.zeros(4, np.float32)
+        tight = truth.person_box(self._box_config.min_pixels)
+        if tight is not None:
+            u0, v0, u1, v1 = tight
+            width, height = u1 - u0, v1 - v0
+            u = 0.5 * (u0 + u1) + self._box_config.centre_jitter * errors[0] * width
+            v = 0.5 * (v0 + v1) + self._box_config.centre_jitter * errors[1] * height
+            half_w = 0.5 * width * max(1.0 + self._box_config.size_jitter * errors[2], 0.2)
+            half_h = 0.5 * height * max(1.0 + self._box_config.size_jitter * errors[3], 0.2)
+            limit_u, limit_v = float(self.camera.width), float(self.camera.height)
+            box[:] = (
+                min(max(u - half_w, 0.0), limit_u),
+                min(max(v - half_h, 0.0), limit_v),
+                min(max(u + half_w, 0.0), limit_u),
+                min(max(v + half_h, 0.0), limit_v),
+            )
+        return RGBDFrame(truth.rgb, depth, truth.ids), box
+
+    def _delayed(self, value: Any) -> Any:
+        """Return what was seen `latency_s` ago (at the start: the oldest there is)."""
+        self._queue.append(value)
+        return self._queue.popleft() if len(self._queue) > self._delay else self._queue[0]
+
+    def _info(self) -> dict[str, Any]:
+        assert self._world is not None
+        steps = self._steps + 1
+        success = (
+            self._collision == "none" and self._longest_out_of_view * self.dt <= 1.0 and self._in_band >= 0.8 * steps
+        )
+        info = {
+            "time": self.time,
+            "bearing": self._bearing,
+            "distance": self._distance,
+            "visible": self._visible,
+            "collision": self._collision != "none",
+            "collision_with": self._collision,
+            "surface_distance": self._surface_distance,
+            "robot_pose": np.array(self._robot_pose),
+            "person_pose": np.array(self._person_pose),
+            "person_velocity": np.array(self._person_velocity),
+            "twist": np.array(self._twist),
+            "command": np.array(self._world.command),
+            "saturated": self._saturated,
+            "rewards": dict(self._rewards),
+            "is_success": success,
+        }
+        if self._obs == "rgbd_uint8":
+            info["depth"] = self._observed.depth
+        return info
+
+    def _show(self, info: dict[str, Any]) -> None:
+        """Feed the dashboard when somebody looks; open or refresh the window in `human` mode."""
+        if self.render_mode not in ("rgb_array", "human"):
+            return
+        if self._dashboard is None:
+            self._dashboard = Dashboard(self._scene, self.camera, self.robot_config.camera_forward)
+        frame = self._observed if self._obs.startswith("rgbd") else self.frame()
+        self._dashboard.update(info, frame)
+        if self.render_mode == "human":
+            show_window(self._dashboard.image(), 1.0 / self.dt)

@@ -1,0 +1,110 @@
+"""`Scene`: the immutable geometry of a place. The one source for physics and cameras.
+
+World frame: x along the scene's main direction, y left, z up, floor at z = 0, metres.
+"""
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Material:
+    """A surface: colour as sRGB in [0, 1] and a specular share in [0, 1]."""
+
+    colour: tuple[float, float, float]
+    specular: float = 0.1
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box: centre (m), full size (m), yaw about z (rad). `solid=False` is decoration without collision."""
+
+    centre: tuple[float, float, float]
+    size: tuple[float, float, float]
+    material: Material
+    yaw: float = 0.0
+    solid: bool = True
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """An upright cylinder: centre (m), radius (m), height (m)."""
+
+    centre: tuple[float, float, float]
+    radius: float
+    height: float
+    material: Material
+    solid: bool = True
+
+
+@dataclass(frozen=True)
+class Light:
+    """A lamp: position (m) and intensity relative to the scene's ambient light of 1."""
+
+    position: tuple[float, float, float]
+    intensity: float
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Primitives, floor, lights and the free region in which people walk.
+
+    Attributes:
+        name: scene name.
+        primitives: boxes and cylinders.
+        floor: the floor's material.
+        lights: lamps.
+        ambient: ambient light in [0, 1].
+        bounds: (x_min, x_max, y_min, y_max) of the floor, m.
+        start: (x, y, heading) of the robot at the start of a route, m and rad.
+        start_width: routes start up to this far to either side of `start`, m.
+    """
+
+    name: str
+    primitives: tuple[Box | Cylinder, ...]
+    floor: Material
+    lights: tuple[Light, ...]
+    ambient: float
+    bounds: tuple[float, float, float, float]
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    start_width: float = 0.3
+
+    def obstacles(self) -> tuple[Box | Cylinder, ...]:
+        """Solid primitives that a person or the robot could run into (those whose lower edge is below 2 m)."""
+        return tuple(
+            p
+            for p in self.primitives
+            if p.solid and p.centre[2] - 0.5 * (p.size[2] if isinstance(p, Box) else p.height) < 2.0
+        )
+
+    def clearance(self, points: np.ndarray) -> float:
+        """Least horizontal distance between any of the points (n, 2) and any obstacle, m; 0 inside one."""
+        centres, halves, axes, radii = self._footprints
+        offset = points[:, None, :] - centres
+        along = np.abs(offset[..., 0] * axes[:, 0] + offset[..., 1] * axes[:, 1])
+        across = np.abs(offset[..., 1] * axes[:, 0] - offset[..., 0] * axes[:, 1])
+        gap_x, gap_y = np.maximum(along - halves[:, 0], 0.0), np.maximum(across - halves[:, 1], 0.0)
+        return float(np.maximum(np.sqrt(gap_x * gap_x + gap_y * gap_y) - radii, 0.0).min())
+
+    @functools.cached_property
+    def _footprints(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Centres (n, 2), half sizes (n, 2), cosine and sine of the yaw (n, 2) and rounding radii (n,) of obstacles."""
+        rows = [
+            (*p.centre[:2], 0.5 * p.size[0], 0.5 * p.size[1], math.cos(p.yaw), math.sin(p.yaw), 0.0)
+            if isinstance(p, Box)
+            else (*p.centre[:2], 0.0, 0.0, 1.0, 0.0, p.radius)
+            for p in self.obstacles()
+        ]
+        table = np.array(rows)
+        return table[:, :2], table[:, 2:4], table[:, 4:6], table[:, 6]
+
+    def illumination(self, x: float, y: float) -> float:
+        """Relative brightness at the floor point (x, y): lamps with inverse-square falloff, about 1 under a lamp."""
+        total = 0.0
+        for light in self.lights:
+            dx, dy, dz = light.position[0] - x, light.position[1] - y, light.position[2] - 1.0
+            total += light.intensity * dz * dz / (dx * dx + dy * dy + dz * dz)
+        return total

@@ -114,6 +114,8 @@ class BoxConfig:
 class MeasurementConfig:
     """What a tracker would report, without rendering (`follow_env.measurement`).
 
+    The defaults are what rendered frames give with paper A's depth rule (`follow calibrate`), rounded.
+
     Attributes:
         bearing_bias, distance_bias: constant errors, rad and m.
         bearing_noise, distance_noise: standard deviations of the regular errors, rad and m.
@@ -125,11 +127,11 @@ class MeasurementConfig:
     """
 
     bearing_bias: float = 0.0
-    bearing_noise: float = 0.01
+    bearing_noise: float = 0.012
     bearing_correlation_s: float = 0.1
-    distance_bias: float = -0.11
-    distance_noise: float = 0.03
-    distance_correlation_s: float = 0.1
+    distance_bias: float = -0.105
+    distance_noise: float = 0.01
+    distance_correlation_s: float = 0.4
     outlier_share: float = 0.0
     outlier_duration_s: float = 0.1
     outlier_low: float = 1.0

@@ -116,13 +116,14 @@ class FollowEnv(gymnasium.Env):
         self.robot_config = build("robot", RobotConfig(), robot)
         self.camera = PinholeCamera(build("camera", CameraConfig(), camera))
         self._sensor = sensor_config(sensor)
-        self._scene = make_scene(scene)
+        self.scene = make_scene(scene)
         self._world: World | None = None
         self._renderer: Renderer | None = None
         self._dashboard: Dashboard | None = None
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.observation_space = self._make_observation_space()
         self._route: Route | None = None
+        self.observed: RGBDFrame | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode.
@@ -137,14 +138,14 @@ class FollowEnv(gymnasium.Env):
         for key in options:
             choose("reset option", key, ("route", "robot_pose", "person", "sensor"))
         if self._world is None:
-            self._world = World(self._scene, self.robot_config)
+            self._world = World(self.scene, self.robot_config)
         self._set_up_sensors(sensor_config(options["sensor"]) if "sensor" in options else self._sensor)
         self._dress(choose("person", options.get("person", self._person), CLOTHES))
 
-        x, y, yaw = self._scene.start
-        y += float(self.np_random.uniform(-1.0, 1.0)) * self._scene.start_width
+        x, y, yaw = self.scene.start
+        y += float(self.np_random.uniform(-1.0, 1.0)) * self.scene.start_width
         ahead = (x + SET_POINT * math.cos(yaw), y + SET_POINT * math.sin(yaw), yaw)
-        self._route = make_route(options.get("route", self._route_name), self._scene, ahead, self.np_random)
+        self._route = make_route(options.get("route", self._route_name), self.scene, ahead, self.np_random)
         robot_pose = tuple(float(value) for value in options.get("robot_pose", (x, y, yaw)))
         if len(robot_pose) != 3 or not all(map(math.isfinite, robot_pose)):
             raise ValueError(f"robot_pose is {options['robot_pose']!r}; expected three finite numbers (x, y, yaw)")
@@ -217,7 +218,7 @@ class FollowEnv(gymnasium.Env):
         """Return the camera's picture of this moment without sensor errors: the truth, for pictures and tests."""
         assert self._route is not None and self._world is not None
         if self._renderer is None:
-            self._renderer = make_renderer(self._renderer_name, self._scene, self.camera, self._dressed)
+            self._renderer = make_renderer(self._renderer_name, self.scene, self.camera, self._dressed)
         x, y, heading = self._route.pose(self.time)
         person = gait.pose(x, y, heading, self._route.walked(self.time), self._route.speed(self.time))
         return self._renderer.render(self.camera_pose(), person)
@@ -323,7 +324,7 @@ class FollowEnv(gymnasium.Env):
             self._last_measured = max(self.time - age, 0.0)
             return np.array((seen[0], min(seen[1], MAX_DISTANCE), 1.0, age, *own), np.float32)
         frame, box = self._delayed(self._sense())
-        self._observed: RGBDFrame = frame
+        self.observed = frame
         if self._obs == "rgbd_uint8":
             near = np.where((frame.depth > 0.0) & (frame.depth < 8.0), 255.0 * (1.0 - frame.depth / 8.0), 0.0)
             return np.dstack((frame.rgb, near.astype(np.uint8)))
@@ -384,7 +385,7 @@ class FollowEnv(gymnasium.Env):
             "is_success": success,
         }
         if self._obs == "rgbd_uint8":
-            info["depth"] = self._observed.depth
+            info["depth"] = self.observed.depth
         return info
 
     def _show(self, info: dict[str, Any]) -> None:
@@ -392,8 +393,8 @@ class FollowEnv(gymnasium.Env):
         if self.render_mode not in ("rgb_array", "human"):
             return
         if self._dashboard is None:
-            self._dashboard = Dashboard(self._scene, self.camera, self.robot_config.camera_forward)
-        frame = self._observed if self._obs.startswith("rgbd") else self.frame()
+            self._dashboard = Dashboard(self.scene, self.camera, self.robot_config.camera_forward)
+        frame = self.observed if self._obs.startswith("rgbd") else self.frame()
         self._dashboard.update(info, frame)
         if self.render_mode == "human":
             show_window(self._dashboard.image(), 1.0 / self.dt)

@@ -71,15 +71,15 @@ class Dashboard:
 
     def _view(self) -> np.ndarray:
         assert self._frame is not None
-        panel, scale = _fit(self._frame.rgb, cv2.INTER_AREA)
+        panel, scale, left = _fit(self._frame.rgb, cv2.INTER_AREA)
         if self._box is not None:
             u0, v0, u1, v1 = (round(scale * value) for value in self._box)
-            cv2.rectangle(panel, (u0, v0 + HEADER), (u1 - 1, v1 - 1 + HEADER), PERSON, 2)
+            cv2.rectangle(panel, (left + u0, v0 + HEADER), (left + u1 - 1, v1 - 1 + HEADER), PERSON, 2)
         if self._estimates[-1] is not None:
             bearing, distance = self._estimates[-1]
             depth = distance - self._forward
             if depth > 0.2:
-                u = round(scale * (self._camera.cx - self._camera.focal * distance * math.tan(bearing) / depth))
+                u = left + round(scale * (self._camera.cx - self._camera.focal * distance * math.tan(bearing) / depth))
                 cv2.line(panel, (u, HEADER), (u, PANEL[1]), ESTIMATE, 2, cv2.LINE_AA)
         legend = [("box", PERSON)] if self._box is not None else []
         legend += [("estimate", ESTIMATE)] if self._estimates[-1] is not None else []
@@ -90,7 +90,7 @@ class Dashboard:
         share = np.clip(self._frame.depth / DEPTH_RANGE, 0.0, 1.0)
         colours = cv2.applyColorMap((255 * (1.0 - share)).astype(np.uint8), cv2.COLORMAP_VIRIDIS)[:, :, ::-1].copy()
         colours[self._frame.depth <= 0.0] = 0
-        panel, _ = _fit(colours, cv2.INTER_NEAREST)
+        panel, _, _ = _fit(colours, cv2.INTER_NEAREST)
         bar = cv2.applyColorMap(np.linspace(255, 0, 120).astype(np.uint8)[None, :], cv2.COLORMAP_VIRIDIS)
         panel[5:17, PANEL[0] - 165 : PANEL[0] - 45] = bar[:, :, ::-1]
         _text(panel, "0", (PANEL[0] - 178, 16))
@@ -167,14 +167,15 @@ def _blank() -> np.ndarray:
     return np.full((PANEL[1], PANEL[0], 3), PAPER, np.uint8)
 
 
-def _fit(image: np.ndarray, shrink: int) -> tuple[np.ndarray, float]:
-    """Scale the picture to the panel below its header; return the panel and the scale."""
+def _fit(image: np.ndarray, shrink: int) -> tuple[np.ndarray, float, int]:
+    """Scale the picture to the panel below its header; return the panel, the scale and the left margin in px."""
     scale = min(PANEL[0] / image.shape[1], (PANEL[1] - HEADER) / image.shape[0])
     size = (round(image.shape[1] * scale), round(image.shape[0] * scale))
     panel = _blank()
     scaled = cv2.resize(image, size, interpolation=shrink if scale < 1.0 else cv2.INTER_NEAREST)
-    panel[HEADER : HEADER + size[1], : size[0]] = scaled
-    return panel, scale
+    left = (PANEL[0] - size[0]) // 2
+    panel[HEADER : HEADER + size[1], left : left + size[0]] = scaled
+    return panel, scale, left
 
 
 def _text(panel: np.ndarray, text: str, origin: tuple[int, int], size: float = 0.42) -> None:
@@ -243,7 +244,12 @@ def _plot(
     for value in (-limit, 0.0, limit):
         _, v = at(0.0, value)
         cv2.line(panel, (left, v), (right, v), GRID, 1)
-        _text(panel, f"{value:+.0f}" if limit >= 5.0 else f"{value:+.1f}", (left - 40, v + 4), 0.38)
+        _text(
+            panel,
+            "0" if value == 0.0 else f"{value:+.0f}" if limit >= 5.0 else f"{value:+.1f}",
+            (left - 40, v + 4),
+            0.38,
+        )
     for t in range(0, int(span) + 1, 2):
         u, _ = at(float(t), 0.0)
         cv2.line(panel, (u, bottom), (u, bottom + 3), INK, 1)

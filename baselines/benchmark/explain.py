@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from baselines.benchmark.cells import Cell
 from baselines.benchmark.statistics import PooledError, weighted_share
 from baselines.benchmark.table1 import PAPER_RMSE, UNITS, Table1, paper_ratio
 
@@ -11,13 +12,14 @@ NAMES = {"none": "No filter", "kf": "KF", "akf": "AKF", "akf_cv": "augmented AKF
 HYPOTHESES = (("kf", "none"), ("akf", "kf"))
 """(smaller, larger) RMSE, as the paper has them."""
 
-_ALPHA = 0.05
 _FEW_OUTLIERS = 0.2
+_NEGLIGIBLE_SHARE = 0.01
+"""Part of No filter's squared error below which a change is not worth a word."""
 
 
-def number(value: float, quantity: str) -> str:
-    """A value in the quantity's unit, without the unit: four decimals of a rad, two of a cm."""
-    decimals = 4 if quantity == "angle" else 2
+def number(value: float, quantity: str, more: int = 0) -> str:
+    """A value in the quantity's unit, without the unit: four decimals of a rad or two of a cm, or some more."""
+    decimals = (4 if quantity == "angle" else 2) + more
     return f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
@@ -37,7 +39,7 @@ def explain(table: Table1, perception: str, scene: str, quantity: str) -> str | 
         return None
     none = table.error(perception, scene, "none", quantity)
     sentences = [f"{'; '.join(verdicts)}."]
-    if none.rmse > 0.0:
+    if not none.negligible:
         sentences += [_scale(none, scene, quantity), _bias_share(none, quantity)]
     else:
         sentences.append("No filter makes no error on perfect measurements, so a filter can only add its own.")
@@ -45,7 +47,7 @@ def explain(table: Table1, perception: str, scene: str, quantity: str) -> str | 
         _filter_effect(table.error(perception, scene, estimator, quantity), none, estimator, quantity)
         for estimator in ("kf", "akf")
     ]
-    if none.rmse > 0.0:
+    if not none.negligible:
         sentences.append(_outliers(table, perception, scene, quantity))
     return " ".join(sentence for sentence in sentences if sentence)
 
@@ -74,26 +76,38 @@ def _scale(none: PooledError, scene: str, quantity: str) -> str:
 
 def _bias_share(none: PooledError, quantity: str) -> str:
     share = none.bias**2 / none.rmse**2
-    start = f"Bias ({number(none.bias, quantity)} {UNITS[quantity]}) makes {share:.0%} of No filter's squared error"
+    bias, spread, unit = number(none.bias, quantity), number(none.spread, quantity), UNITS[quantity]
+    if share < _NEGLIGIBLE_SHARE:
+        return f"No filter's error is all spread ({spread} {unit})."
+    start = f"Bias ({bias} {unit}) makes {share:.0%} of No filter's squared error"
     if share < 0.5:
-        return f"{start}, spread ({number(none.spread, quantity)} {UNITS[quantity]}) the rest."
+        return f"{start}, spread ({spread} {unit}) the rest."
     return f"{start} and smoothing does not remove it: without any spread the ratio would still be {share**0.5:.2f}."
 
 
 def _filter_effect(error: PooledError, none: PooledError, estimator: str, quantity: str) -> str:
-    bias, spread = error.bias**2 - none.bias**2, error.spread**2 - none.spread**2
-    if bias > 0.0 > spread:
-        outcome = "more bias added than spread removed" if bias + spread > 0.0 else "more spread removed than bias added"
-    elif bias <= 0.0 < spread:
-        outcome = "more spread added than bias removed" if bias + spread > 0.0 else "more bias removed than spread added"
-    elif bias <= 0.0:
-        outcome = "both fall"
-    else:
-        outcome = "both grow"
-    return (
-        f"The {NAMES[estimator]} takes bias from {number(none.bias, quantity)} to {number(error.bias, quantity)} and "
-        f"spread from {number(none.spread, quantity)} to {number(error.spread, quantity)} {UNITS[quantity]}: {outcome}."
-    )
+    """How the filter moved the two parts of the squared error, and which of them decides."""
+    unit = UNITS[quantity]
+    parts = {
+        "bias": (none.bias, error.bias),
+        "spread": (none.spread, error.spread),
+    }
+    change = {name: after**2 - before**2 for name, (before, after) in parts.items()}
+    told = {
+        name: f"{name} from {number(before, quantity)} to {number(after, quantity)} {unit}"
+        for name, (before, after) in parts.items()
+        if abs(change[name]) > _NEGLIGIBLE_SHARE * none.rmse**2
+    }
+    if not told:
+        return f"The {NAMES[estimator]} changes neither bias nor spread."
+    text = f"The {NAMES[estimator]} takes {' and '.join(told.values())}"
+    if len(told) == 2 and change["bias"] * change["spread"] < 0.0:
+        added, removed = sorted(change, key=lambda name: change[name], reverse=True)
+        grows = change["bias"] + change["spread"] > 0.0
+        text += (
+            f": more {added} added than {removed} removed" if grows else f": more {removed} removed than {added} added"
+        )
+    return f"{text}."
 
 
 def _outliers(table: Table1, perception: str, scene: str, quantity: str) -> str:
@@ -109,6 +123,6 @@ def _outliers(table: Table1, perception: str, scene: str, quantity: str) -> str:
     if carried < _FEW_OUTLIERS:
         text += ", which leaves the AKF little to reject"
     text += f"; the AKF inflates {inflated:.1%} of the measurements"
-    if inflated > share + 2.0 * _ALPHA:
+    if inflated > share + 2.0 * Cell(perception, scene, "akf").alpha:
         text += ", good ones among them"
     return f"{text}."

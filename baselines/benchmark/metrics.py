@@ -35,7 +35,8 @@ COLUMNS = (
     *("perception", "scene", "estimator", "controller", "sensor", "q_scale", "alpha", "seed"),
     *("steps", "duration_s", "ended", "estimate_steps", "measurement_share"),
     *("angle_rmse_rad", "angle_bias_rad", "angle_p95_rad", "angle_outlier_share", "angle_outlier_square_share"),
-    *("distance_rmse_m", "distance_bias_m", "distance_p95_m", "distance_outlier_share", "distance_outlier_square_share"),
+    *("distance_rmse_m", "distance_bias_m", "distance_p95_m"),
+    *("distance_outlier_share", "distance_outlier_square_share"),
     *("angle_inflated_share", "angle_nis_mean", "angle_nis_inside_95_share"),
     *("distance_inflated_share", "distance_nis_mean", "distance_nis_inside_95_share"),
     *("angle_tracking_rmse_rad", "distance_tracking_rmse_m", "in_band_share"),
@@ -157,9 +158,7 @@ class _Step(NamedTuple):
     saturated: bool
 
     @classmethod
-    def of(
-        cls, info: Mapping[str, Any], estimate: Estimate | None, measurement: tuple[float, float] | None
-    ) -> _Step:
+    def of(cls, info: Mapping[str, Any], estimate: Estimate | None, measurement: tuple[float, float] | None) -> _Step:
         bearing, distance = float(info["bearing"]), float(info["distance"])
         errors = None
         if estimate is not None:
@@ -236,9 +235,7 @@ def _motion_columns(steps: Sequence[_Step]) -> Row:
 
 
 def _differences(values: Sequence[float], steps: Sequence[_Step]) -> list[float]:
-    return [
-        (values[k] - values[k - 1]) / (steps[k].time - steps[k - 1].time) for k in range(1, len(values))
-    ]
+    return [(values[k] - values[k - 1]) / (steps[k].time - steps[k - 1].time) for k in range(1, len(values))]
 
 
 def _out_of_view(steps: Sequence[_Step]) -> list[float]:
@@ -262,9 +259,7 @@ def _in_band(step: _Step) -> bool:
 
 def _seconds_near(steps: Sequence[_Step]) -> float:
     return math.fsum(
-        steps[k].time - steps[k - 1].time
-        for k in range(1, len(steps))
-        if steps[k].surface_distance < PERSONAL_SURFACE
+        steps[k].time - steps[k - 1].time for k in range(1, len(steps)) if steps[k].surface_distance < PERSONAL_SURFACE
     )
 
 

@@ -9,7 +9,7 @@ import signal
 import threading
 import traceback
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -24,7 +24,7 @@ class EpisodeError(RuntimeError):
     """An episode could not be played to its end; the message names it and holds the traceback."""
 
 
-def play_all(episode: EpisodeFunction, tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Task, Episode]]:
+def play_all(episode: EpisodeFunction, tasks: Sequence[Task], jobs: int) -> Generator[tuple[Task, Episode], None, None]:
     """Play the tasks and yield each with its episode as soon as it is finished, in no particular order.
 
     Args:
@@ -40,7 +40,7 @@ def play_all(episode: EpisodeFunction, tasks: Sequence[Task], jobs: int) -> Iter
     return _play_in_workers(episode, tasks, min(jobs, len(tasks)))
 
 
-def _play_here(episode: EpisodeFunction, tasks: Sequence[Task]) -> Iterator[tuple[Task, Episode]]:
+def _play_here(episode: EpisodeFunction, tasks: Sequence[Task]) -> Generator[tuple[Task, Episode], None, None]:
     for task in tasks:
         try:
             result = episode(*task)
@@ -51,7 +51,7 @@ def _play_here(episode: EpisodeFunction, tasks: Sequence[Task]) -> Iterator[tupl
 
 def _play_in_workers(
     episode: EpisodeFunction, tasks: Sequence[Task], jobs: int
-) -> Iterator[tuple[Task, Episode]]:
+) -> Generator[tuple[Task, Episode], None, None]:
     waiting = deque(tasks)
     playing: dict[Connection, Task] = {}
     processes: dict[Connection, BaseProcess] = {}
@@ -62,8 +62,8 @@ def _play_in_workers(
             playing[connection] = waiting.popleft()
             _hand_over(connection, playing[connection])
         while playing:
-            for connection in wait(list(playing)):
-                assert isinstance(connection, Connection)
+            ready = set(wait(list(playing)))
+            for connection in [connection for connection in playing if connection in ready]:
                 task = playing.pop(connection)
                 try:
                     result = connection.recv()

@@ -1,4 +1,4 @@
-"""``table1.md``: the measured table beside the paper's, the hypotheses, the ratios, and what explains the differences."""
+"""``table1.md``: the measured table beside the paper's, hypotheses and ratios, and what explains the differences."""
 
 from __future__ import annotations
 
@@ -21,8 +21,10 @@ def report(table: Table1) -> str:
     """The whole report as Markdown that also reads well on a terminal."""
     parts = [
         "# Table 1, reproduced",
-        "RMSE over all steps of all episodes, with 95 % bootstrap intervals over whole episodes; rmse² = bias² + spread².\n"
-        "Errors are estimate minus truth: angle positive to the left, distance forward. Differences are paired by seed.",
+        "RMSE over all steps of all episodes, with 95 % bootstrap intervals over whole episodes; "
+        "rmse² = bias² + spread².\n"
+        "Errors are estimate minus truth: angle positive to the left, distance forward. "
+        "Differences are paired by seed.",
     ]
     for perception in table.perceptions:
         episodes = len(table.cell(perception, SCENES[0], "none"))
@@ -66,7 +68,8 @@ def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]], left: i
 
 
 def _errors(table: Table1, perception: str) -> str:
-    header = ["scene", "quantity", "estimator", "RMSE", "95 % interval", "bias", "spread", "ratio", "paper", "paper ratio"]
+    header = ["scene", "quantity", "estimator", "RMSE", "95 % interval", "bias", "spread", "ratio"]
+    header += ["paper", "paper ratio"]
     rows = []
     for scene in SCENES:
         for quantity in QUANTITIES:
@@ -155,8 +158,8 @@ def _ratio(value: float | None) -> str:
 
 
 def _difference(difference: Difference, quantity: str) -> str:
-    text = number(difference.value, quantity)
+    text = number(difference.value, quantity, more=1)
     if difference.interval is None:
         return text
     low, high = difference.interval
-    return f"{text} ({number(low, quantity)} to {number(high, quantity)})"
+    return f"{text} ({number(low, quantity, more=1)} to {number(high, quantity, more=1)})"

@@ -1,10 +1,9 @@
-"""`follow reproduce table1`: play what is missing, keep each episode, and write the tables and figures from the store."""
+"""`follow reproduce table1`: play what is missing, keep each episode, and write tables and figures from the store."""
 
 from __future__ import annotations
 
 import contextlib
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from baselines.benchmark.studies import FAMILY_COLUMNS, SENSITIVITY_COLUMNS, stu
 from baselines.benchmark.table1 import COLUMNS, Table1
 
 FIGURES = "figures"
-_RESULTS = ("table1.csv", "table1.md", "episodes.csv", "sensitivity.csv", "family.csv", "curves.csv", "timing.csv")
+_RESULTS = (configuration.FILE_NAME, "table1.csv", "table1.md", "episodes.csv")
 _TIMING_COLUMNS = ("cell", "seed", "policy_step_mean_s", "policy_step_p95_s")
 _DIGITS = 6
 
@@ -54,7 +53,7 @@ def reproduce(
     """
     settings = configuration.settings(plan, calibration)
     digest = configuration.digest(settings)
-    _claim(out, digest)
+    _claim(out)
     with Store(out, digest) as episodes:
         if len(episodes) and not resume:
             raise InputError(
@@ -69,37 +68,23 @@ def reproduce(
             return _write_results(plan, episodes, out)
 
 
-def _claim(out: Path, digest: str) -> None:
+def _claim(out: Path) -> None:
     """Make the folder, and refuse one whose results would be lost."""
     with _writable(out):
         out.mkdir(parents=True, exist_ok=True)
         results = [name for name in _RESULTS if (out / name).exists()]
-        stored = (out / store.FILE_NAME).exists()
-        config = out / configuration.FILE_NAME
-        text = config.read_text(encoding="utf-8") if config.exists() else None
+        path = out / store.FILE_NAME
+        stored = path.exists() and path.stat().st_size > 0
     if results and not stored:
         raise InputError(
             f"{out} holds {results[0]} but not the episodes it was made from ({store.FILE_NAME}), so it would be lost: "
             "choose another folder with --out."
         )
-    if text is not None and (found := _digest_in(text)) != digest:
-        if results or stored:
-            raise InputError(
-                f"{out} holds results of another configuration ({found[:12]}, this one is {digest[:12]}): "
-                "choose another folder with --out."
-            )
-
-
-def _digest_in(text: str) -> str:
-    """The hash that a ``config.json`` names, or a word that equals no hash."""
-    try:
-        return str(json.loads(text)["settings_sha256"])
-    except (ValueError, KeyError, TypeError):
-        return "unreadable"
 
 
 @contextlib.contextmanager
-def _writable(out: Path):  # type: ignore[no-untyped-def]
+def _writable(out: Path) -> Iterator[None]:
+    """Turn the system's refusals into sentences with a remedy."""
     try:
         yield
     except OSError as error:

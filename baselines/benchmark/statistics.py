@@ -18,6 +18,8 @@ from baselines.benchmark.metrics import Row
 
 RESAMPLES = 10_000
 CONFIDENCE = 0.95
+NEGLIGIBLE = 1e-4
+"""RMSE, rad or cm, below which an error is the rounding of a single-precision observation and nothing else."""
 _GENERATOR_SEED = 20_180_901
 
 Interval = tuple[float, float]
@@ -98,6 +100,11 @@ class PooledError:
         return math.sqrt(max(0.0, self.rmse**2 - self.bias**2))
 
     @property
+    def negligible(self) -> bool:
+        """Whether there is no error but rounding: nothing can be compared with it."""
+        return self.rmse < NEGLIGIBLE
+
+    @property
     def interval(self) -> Interval | None:
         """95 % interval of the RMSE."""
         return None if self.episodes < 2 else _interval(self._resampled_rmse)
@@ -112,9 +119,9 @@ class PooledError:
         )
 
     def ratio_to(self, other: PooledError) -> Difference | None:
-        """Paired ratio of the RMSEs, this over the other; None when the other has no error at all."""
+        """Paired ratio of the RMSEs, this over the other; None when the other's error is negligible."""
         self._require_pairs(other)
-        if not np.all(other.squares > 0.0):
+        if other.negligible:
             return None
         paired = self.episodes >= 2
         return Difference(

@@ -120,38 +120,45 @@ class Store:
 
     def _check(self) -> None:
         """Refuse a file that is damaged or another program's, before anything is written to it and any work is done."""
-        problems = [text for (text,) in self._connection.execute("PRAGMA integrity_check(1)")]
-        if problems != ["ok"]:
-            raise self._damaged(problems[0])
-        if self._is_ours():
-            for *values, checksum in self._connection.execute(_EPISODES_AS_BYTES):
-                if _sum(*values) != checksum:
-                    raise self._damaged("an episode has changed since it was written")
-        elif self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
-            raise InputError(
-                f"{self._path} is a database of another program; it was left as it is: choose another folder with --out."
-            )
+        with self._transaction("BEGIN"):
+            problems = [text for (text,) in self._connection.execute("PRAGMA integrity_check(1)")]
+            if problems != ["ok"]:
+                raise self._damaged(problems[0])
+            if self._is_ours():
+                for *values, checksum in self._connection.execute(_EPISODES_AS_BYTES):
+                    if _sum(*values) != checksum:
+                        raise self._damaged("an episode has changed since it was written")
+            elif self._connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+                raise InputError(
+                    f"{self._path} is a database of another program; it was left as it is: "
+                    "choose another folder with --out."
+                )
 
     def _prepare(self, configuration: str) -> None:
-        """Create what is missing and compare the configuration, in one transaction."""
+        """Create what is missing, compare the configuration, and see that the file can be written."""
         self._connection.execute("PRAGMA synchronous = FULL")
-        self._connection.execute("BEGIN IMMEDIATE")
-        try:
+        with self._transaction("BEGIN IMMEDIATE"):
             if not self._is_ours():
                 for statement in filter(str.strip, _SCHEMA.split(";")):
                     self._connection.execute(statement)
                 self._connection.execute("INSERT INTO configuration VALUES (?)", (configuration,))
                 self._connection.execute(f"PRAGMA application_id = {_APPLICATION}")
             (stored,) = self._connection.execute("SELECT sha256 FROM configuration").fetchone()
-            if stored != configuration:
-                if len(self):
-                    raise InputError(
-                        f"{self._path.parent} holds {len(self)} episodes of another configuration "
-                        f"({stored[:12]}, this one is {configuration[:12]}): choose another folder with --out."
-                    )
-                self._connection.execute("UPDATE configuration SET sha256 = ?", (configuration,))
+            if stored != configuration and len(self):
+                raise InputError(
+                    f"{self._path.parent} holds {len(self)} episodes of another configuration "
+                    f"({stored[:12]}, this one is {configuration[:12]}): choose another folder with --out."
+                )
+            self._connection.execute("UPDATE configuration SET sha256 = ?", (configuration,))
+
+    @contextmanager
+    def _transaction(self, begin: str) -> Iterator[None]:
+        self._connection.execute(begin)
+        try:
+            yield
         except BaseException:
-            self._connection.execute("ROLLBACK")
+            if self._connection.in_transaction:  # SQLite itself rolls back when the disk is full
+                self._connection.execute("ROLLBACK")
             raise
         self._connection.execute("COMMIT")
 

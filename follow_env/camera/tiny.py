@@ -30,6 +30,9 @@ class TinyRenderer:
             self._add_primitive(primitive)
         self._person = [self._add_mesh(*s.mesh(), Material(s.colour, 0.0)) for s in segments(clothes)]
         self._projection = camera.projection_matrix()
+        # TinyRenderer samples a pixel at its lower left corner, not its centre: shift the picture by half a pixel.
+        self._projection[8] += 1.0 / camera.width
+        self._projection[9] += 1.0 / camera.height
 
     def render(self, camera: CameraPose, person: list[SegmentPose]) -> RGBDFrame:
         """Return the frame seen from `camera` with the person's segments at `person`."""

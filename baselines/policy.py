@@ -1,0 +1,239 @@
+"""`Policy`: SB3's `predict` signature; `Follower` = perception + estimator + controller, the reference policies.
+
+The estimate of a follower is part of its state, so that eq. (35) can be evaluated: `state.estimate`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from baselines.controllers import Controller
+from baselines.controllers.pi import PIController
+from follow_env.config import CameraConfig, RobotConfig, choose
+from tracker.filters import (
+    AdaptiveKalmanFilter,
+    AugmentedKalmanFilter,
+    Estimate,
+    Estimator,
+    KalmanFilter,
+    NoFilter,
+)
+from tracker.geometry import Intrinsics
+from tracker.sampling import Rule, measure
+
+Pair = tuple[float, float]
+Percept = tuple[Pair | None, Pair]
+"""A measurement (bearing rad, distance m) or None, and the odometry twist (v m/s, omega rad/s)."""
+
+OBSERVATION_OF = {"truth": "state", "emulated": "measurement", "mask": "rgbd_box"}
+"""Perception -> the environment's observation mode that it reads."""
+ESTIMATORS = ("none", "kf", "akf", "akf_cv")
+CONTROLLERS = ("pi",)
+
+
+class Policy(Protocol):
+    """Anything that drives: the signature of Stable-Baselines3's `predict`."""
+
+    def predict(
+        self,
+        observation: Any,
+        state: Any = None,
+        episode_start: np.ndarray | None = None,
+        deterministic: bool = True,
+    ) -> tuple[np.ndarray, Any]:
+        """Return the action (2,) or (n, 2) in [-1, 1] and the state to hand back with the next observation."""
+
+
+@dataclass
+class FollowerState:
+    """What a follower remembers within one episode.
+
+    Attributes:
+        estimator, controller: their memory.
+        measurement: latest measurement (bearing rad, distance m), or None when the last step had none.
+        estimate: latest estimate, or None while nothing was ever measured.
+    """
+
+    estimator: Estimator
+    controller: Controller
+    measurement: Pair | None = None
+    estimate: Estimate | None = None
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Noise settings of the Kalman filters at one control rate; pairs are (bearing, distance).
+
+    Attributes:
+        measurement: R, variances in (rad^2, m^2).
+        process: Q per control step, variances in (rad^2, m^2).
+        acceleration: spectral densities of the augmented filter, (rad^2/s^3, m^2/s^3).
+    """
+
+    measurement: Pair
+    process: Pair
+    acceleration: Pair
+
+
+class Follower:
+    """Perception, then estimation, then control; stands still until the person was seen once.
+
+    Args:
+        perceive: turns one observation into (measurement, odometry twist).
+        make_estimator: returns a fresh estimator for an episode.
+        make_controller: returns a fresh controller for an episode.
+        robot: gives the scale of the twist action.
+        dt: control period, s.
+    """
+
+    def __init__(
+        self,
+        perceive: Callable[[Any], Percept],
+        make_estimator: Callable[[], Estimator],
+        make_controller: Callable[[], Controller] = PIController.from_paper,
+        robot: RobotConfig | None = None,
+        dt: float = 1.0 / 30.0,
+    ) -> None:
+        self._perceive = perceive
+        self._make_estimator, self._make_controller = make_estimator, make_controller
+        robot = robot or RobotConfig()
+        self._scale = (robot.max_speed, robot.max_yaw_rate)
+        self._dt = dt
+
+    def predict(
+        self,
+        observation: Any,
+        state: Any = None,
+        episode_start: np.ndarray | None = None,
+        deterministic: bool = True,
+    ) -> tuple[np.ndarray, Any]:
+        """Return (action, state) for one observation, or for a batch of n with a list of n states.
+
+        Args:
+            observation: of the mode that the perception reads, single or batched along the first axis.
+            state: what the last call returned; None at the start.
+            episode_start: (n,) or scalar; True forgets the state.
+            deterministic: followers always are.
+
+        Returns:
+            Actions float32 in [-1, 1], (2,) or (n, 2): the twist as shares of the robot's limits.
+        """
+        batch = _split(observation)
+        if batch is None:
+            starts = state is None or (episode_start is not None and bool(np.any(episode_start)))
+            return self._step(observation, None if starts else state)
+        flags = np.zeros(len(batch), bool) if episode_start is None else np.asarray(episode_start).reshape(-1)
+        states = [None] * len(batch) if state is None else state
+        results = [self._step(o, None if f else s) for o, s, f in zip(batch, states, flags, strict=True)]
+        return np.stack([action for action, _ in results]), [new for _, new in results]
+
+    def _step(self, observation: Any, state: FollowerState | None) -> tuple[np.ndarray, FollowerState]:
+        if state is None:
+            state = FollowerState(self._make_estimator(), self._make_controller())
+        state.measurement, twist = self._perceive(observation)
+        state.estimator.predict(twist, self._dt)
+        state.estimate = state.estimator.update(state.measurement)
+        if state.estimate is None:
+            return np.zeros(2, np.float32), state
+        v, omega = state.controller.command(state.estimate.bearing, state.estimate.distance, self._dt)
+        shares = (v / self._scale[0], omega / self._scale[1])
+        return np.array([min(max(share, -1.0), 1.0) for share in shares], np.float32), state
+
+
+def perceive_state(observation: np.ndarray) -> Percept:
+    """Read the truth from a `state` observation."""
+    bearing, distance, _, _, v, omega, _, _ = observation.tolist()
+    return (bearing, distance), (v, omega)
+
+
+def perceive_measurement(observation: np.ndarray) -> Percept:
+    """Read the tracker's report from a `measurement` observation; no measurement when it is not valid."""
+    bearing, distance, valid, _, v, omega, _, _ = observation.tolist()
+    return ((bearing, distance) if valid else None), (v, omega)
+
+
+@dataclass(frozen=True)
+class BoxPerception:
+    """Measures from RGB-D and a box: the `mask` rung. Depth is read from the box by `rule`, eqs. (24)-(31)."""
+
+    intrinsics: Intrinsics
+    camera_forward: float
+    rule: Rule = "six_smallest"
+
+    def __call__(self, observation: Mapping[str, np.ndarray]) -> Percept:
+        """Return (measurement or None, odometry twist) from an `rgbd_box` observation."""
+        v, omega = observation["twist"].tolist()
+        u0, v0, u1, v1 = observation["box"].tolist()
+        if u1 <= u0:
+            return None, (v, omega)
+        box = (u0, v0, u1, v1)
+        return measure(observation["depth"], box, self.intrinsics, self.camera_forward, self.rule), (v, omega)
+
+
+def make_perception(
+    name: str, camera: CameraConfig | None = None, robot: RobotConfig | None = None, rule: Rule = "six_smallest"
+) -> Callable[[Any], Percept]:
+    """Return the perception `name` (a key of `OBSERVATION_OF`) for a camera on a robot."""
+    choose("perception", name, OBSERVATION_OF)
+    if name == "truth":
+        return perceive_state
+    if name == "emulated":
+        return perceive_measurement
+    camera, robot = camera or CameraConfig(), robot or RobotConfig()
+    intrinsics = Intrinsics.from_hfov(camera.width, camera.height, math.radians(camera.hfov_deg))
+    return BoxPerception(intrinsics, robot.camera_forward, rule)
+
+
+def make_estimator(name: str, noise: NoiseModel, alpha: float = 0.05) -> Estimator:
+    """Return a fresh estimator: `none`, `kf`, `akf` (paper B) or `akf_cv` (with the person's velocity)."""
+    choose("estimator", name, ESTIMATORS)
+    if name == "none":
+        return NoFilter()
+    if name == "kf":
+        return KalmanFilter(noise.process, noise.measurement)
+    if name == "akf":
+        return AdaptiveKalmanFilter(noise.process, noise.measurement, alpha)
+    return AugmentedKalmanFilter(noise.acceleration, noise.measurement, alpha)
+
+
+def make_follower(
+    estimator: str = "akf",
+    perception: str = "emulated",
+    scene: str = "corridor",
+    controller: str = "pi",
+    noise: NoiseModel | None = None,
+    alpha: float = 0.05,
+    camera: CameraConfig | None = None,
+) -> Follower:
+    """Return paper B's follower, or a variant of it.
+
+    Args:
+        estimator: `none`, `kf`, `akf` or `akf_cv`.
+        perception: `truth`, `emulated` or `mask`; `OBSERVATION_OF` says which observation it reads.
+        scene: whose calibrated noise is taken when `noise` is None.
+        controller: `pi`, the paper's gains.
+        noise: R and Q; by default those of the calibration for this perception and scene.
+        alpha: significance of the adaptive test.
+        camera: of the `rgbd_box` observation that `mask` reads; by default the environment's default camera.
+    """
+    from baselines.benchmark.calibration import noise_model
+
+    choose("controller", controller, CONTROLLERS)
+    if noise is None:
+        noise = noise_model(perception, scene)
+    make_estimator(estimator, noise, alpha)
+    return Follower(make_perception(perception, camera), lambda: make_estimator(estimator, noise, alpha))
+
+
+def _split(observation: Any) -> list[Any] | None:
+    """Return the single observations of a batch, or None when the observation is a single one."""
+    if isinstance(observation, Mapping):
+        if observation["depth"].ndim == 2:
+            return None
+        return [{key: value[i] for key, value in observation.items()} for i in range(len(observation["depth"]))]
+    return None if np.ndim(observation) == 1 else list(observation)

@@ -13,14 +13,20 @@ from baselines.benchmark.cells import Cell
 from follow_env.env import FollowEnv
 from follow_env.view import Dashboard
 
-CAMERA = {"width": 320, "height": 240}
+CAMERA = (320, 240)
 SHEET_PICTURES = 4
 CODEC = "mp4v"
 """MPEG-4 part 2: the one MP4 codec that every OpenCV wheel can write quickly."""
 
 
-def watch(cell: Cell, seed: int, video: Path) -> str:
-    """Play an episode of `cell`, write `video` (MP4) and a contact sheet (PNG beside it); return a summary.
+def watch(cell: Cell, seed: int, video: Path, camera: tuple[int, int] = CAMERA) -> str:
+    """Play an episode, write a video and a contact sheet, and return a summary.
+
+    Args:
+        cell: perception, scene and estimator.
+        seed: of the episode.
+        video: the MP4 file; the sheet is the PNG of the same name.
+        camera: width and height of the robot's picture, px.
 
     Raises:
         ValueError: if the video cannot be written.
@@ -28,14 +34,15 @@ def watch(cell: Cell, seed: int, video: Path) -> str:
     sheet = video.with_suffix(".png")
     if not video.parent.is_dir():
         raise ValueError(f"the folder {video.parent} of --video does not exist; make it first or name another")
-    env = FollowEnv(**{**environment_kwargs(cell), "camera": CAMERA})
+    size = {"width": camera[0], "height": camera[1]}
+    env = FollowEnv(**{**environment_kwargs(cell), "camera": size})
     dashboard = Dashboard(
         env.scene,
         env.camera,
         env.robot_config.camera_forward,
         f"{cell.scene}, {cell.perception}, {cell.estimator} + PI",
     )
-    policy, state = follower(cell, CAMERA), None
+    policy, state = follower(cell, size), None
     observation, info = env.reset(seed=seed)
     pictures: list[np.ndarray] = []
     writer = _Writer(video, round(1.0 / env.dt))

@@ -1,7 +1,7 @@
 """The walker's routes: a path and a speed profile, sampled once, evaluated at any time.
 
 A route is written as heading(t) and walked(t) in closed form; the position is their integral. It is tabulated at
-20 Hz by Simpson's rule and evaluated by cubic Hermite interpolation (position error below 0.1 mm), so that it does
+10 Hz by Simpson's rule and evaluated by cubic Hermite interpolation (position error below 0.1 mm), so that it does
 not depend on the control rate.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 from follow_env.config import choose
 from follow_env.scene import Scene
 
-TABLE_STEP = 0.05
+TABLE_STEP = 0.1
 """Spacing of the table, s."""
 
 CLEARANCE = 0.50
@@ -131,23 +131,23 @@ class Route:
 def paper_route(scene: Scene, start: tuple[float, float, float], rng: np.random.Generator) -> Route:
     """Return a route of paper B (section 3): 12 m in 14 s, one or two turns of 20-50 deg over 0.8-1.6 s each.
 
-    The heading stays within +-50 deg of the start; the walker starts and stops over 1 s. Candidates that pass nearer
-    than `CLEARANCE` to an obstacle are drawn again.
+    The heading stays within +-50 deg of the start; the walker starts and stops over 1 s. Half of the routes have one
+    turn, half have two. Candidates that pass nearer than `CLEARANCE` to an obstacle are drawn again.
     """
+    count = int(rng.integers(1, 3))
     for _ in range(1000):
-        turns = _draw_turns(rng)
+        turns = _draw_turns(count, rng)
         outline = _outline(start, turns)
         if outline is None or scene.clearance(outline) < CLEARANCE - CORNER_CUT:
             continue
         route = Route(start, turns=turns)
-        if scene.clearance(route.points()[::5]) >= CLEARANCE:
+        if scene.clearance(route.points()[::3]) >= CLEARANCE:
             return route
     raise ValueError(f"no route of 12 m with turns of 20-50 deg fits the scene {scene.name!r}; widen its free lane")
 
 
-def _draw_turns(rng: np.random.Generator) -> tuple[Turn, ...]:
-    """Draw one or two turns, in the order of time, within 1.5-12 s."""
-    count = int(rng.integers(1, 3))
+def _draw_turns(count: int, rng: np.random.Generator) -> tuple[Turn, ...]:
+    """Draw `count` turns, in the order of time, within 1.5-12 s."""
     begins = sorted(float(t) for t in rng.uniform(1.5, 12.0, count))
     angles = rng.uniform(math.radians(20.0), LARGEST_TURN, count) * (1.0 - 2.0 * rng.integers(0, 2, count))
     durations = rng.uniform(0.8, 1.6, count)

@@ -92,13 +92,13 @@ class Scene:
     @functools.cached_property
     def _footprints(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Centres (n, 2), half sizes (n, 2), cosine and sine of the yaw (n, 2) and rounding radii (n,) of obstacles."""
-        rows = [
+        rows = {
             (*p.centre[:2], 0.5 * p.size[0], 0.5 * p.size[1], math.cos(p.yaw), math.sin(p.yaw), 0.0)
             if isinstance(p, Box)
             else (*p.centre[:2], 0.0, 0.0, 1.0, 0.0, p.radius)
             for p in self.obstacles()
-        ]
-        table = np.array(rows)
+        }
+        table = np.array(sorted(rows))
         return table[:, :2], table[:, 2:4], table[:, 4:6], table[:, 6]
 
     def illumination(self, x: float, y: float) -> float:

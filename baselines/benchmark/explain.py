@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from baselines.benchmark.cells import Cell
-from baselines.benchmark.statistics import PooledError, weighted_share
+from baselines.benchmark.statistics import Difference, PooledError, weighted_share
 from baselines.benchmark.table1 import PAPER_RMSE, UNITS, Table1, paper_ratio
 
 RATIO_TOLERANCE = 0.15
@@ -13,6 +13,8 @@ HYPOTHESES = (("kf", "none"), ("akf", "kf"))
 """(smaller, larger) RMSE, as the paper has them."""
 
 _FEW_OUTLIERS = 0.2
+_SLOW_ERRORS = 0.5
+_NO_DIFFERENCE = Difference(0.0, (0.0, 0.0))
 _NEGLIGIBLE_SHARE = 0.01
 """Part of No filter's squared error below which a change is not worth a word."""
 
@@ -43,10 +45,14 @@ def explain(table: Table1, perception: str, scene: str, quantity: str) -> str | 
         sentences += [_scale(none, scene, quantity), _bias_share(none, quantity)]
     else:
         sentences.append("No filter makes no error on perfect measurements, so a filter can only add its own.")
-    sentences += [
-        _filter_effect(table.error(perception, scene, estimator, quantity), none, estimator, quantity)
-        for estimator in ("kf", "akf")
-    ]
+    kf, akf = (table.error(perception, scene, estimator, quantity) for estimator in ("kf", "akf"))
+    sentences.append(_filter_effect(kf, none, "kf", quantity))
+    if not none.negligible:
+        sentences.append(_correlation(table, perception, scene, quantity))
+    if akf.minus(kf) == _NO_DIFFERENCE:
+        sentences.append("The AKF finds no outlier in any episode and does what the KF does.")
+    else:
+        sentences.append(_filter_effect(akf, none, "akf", quantity))
     if not none.negligible:
         sentences.append(_outliers(table, perception, scene, quantity))
     return " ".join(sentence for sentence in sentences if sentence)
@@ -55,9 +61,9 @@ def explain(table: Table1, perception: str, scene: str, quantity: str) -> str | 
 def _verdicts(table: Table1, perception: str, scene: str, quantity: str) -> list[str]:
     verdicts = []
     for smaller, larger in HYPOTHESES:
-        sign = table.difference(perception, scene, quantity, smaller, larger).sign
-        if sign >= 0:
-            outcome = "does not hold" if sign > 0 else "is undecided"
+        holds = table.difference(perception, scene, quantity, smaller, larger).negative
+        if not holds:
+            outcome = "is undecided" if holds is None else "does not hold"
             verdicts.append(f"{NAMES[smaller]} < {NAMES[larger]} {outcome}")
     for estimator in ("kf", "akf"):
         ratio, paper = table.ratio(perception, scene, quantity, estimator), paper_ratio(scene, quantity, estimator)
@@ -108,6 +114,18 @@ def _filter_effect(error: PooledError, none: PooledError, estimator: str, quanti
             f": more {added} added than {removed} removed" if grows else f": more {removed} removed than {added} added"
         )
     return f"{text}."
+
+
+def _correlation(table: Table1, perception: str, scene: str, quantity: str) -> str:
+    """Whether the errors are ones that averaging could remove, where the KF removes less than the paper's."""
+    ratio, paper = table.ratio(perception, scene, quantity, "kf"), paper_ratio(scene, quantity, "kf")
+    correlation = weighted_share(table.cell(perception, scene, "none"), f"{quantity}_error_correlation")
+    if ratio is None or paper is None or correlation is None or ratio <= paper * (1.0 + RATIO_TOLERANCE):
+        return ""
+    text = f"Successive errors of No filter correlate by {correlation:.2f}"
+    if correlation >= _SLOW_ERRORS:
+        return f"{text}: they change too slowly for a filter to average them away."
+    return f"{text}, so averaging could remove more: the gain that the rule for Q gives leaves the rest."
 
 
 def _outliers(table: Table1, perception: str, scene: str, quantity: str) -> str:

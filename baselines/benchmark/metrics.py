@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +36,7 @@ COLUMNS = (
     *("perception", "scene", "estimator", "controller", "sensor", "q_scale", "alpha", "seed"),
     *("steps", "duration_s", "ended", "estimate_steps", "measurement_share"),
     *("angle_rmse_rad", "angle_bias_rad", "angle_p95_rad", "angle_outlier_share", "angle_outlier_square_share"),
+    *("angle_error_correlation", "distance_error_correlation"),
     *("distance_rmse_m", "distance_bias_m", "distance_p95_m"),
     *("distance_outlier_share", "distance_outlier_square_share"),
     *("angle_inflated_share", "angle_nis_mean", "angle_nis_inside_95_share"),
@@ -110,7 +112,9 @@ class EpisodeMetrics:
             "path_ratio": _path_ratio(steps),
         }
         for axis, (name, unit) in enumerate((("angle", "rad"), ("distance", "m"))):
-            row |= _error_columns([step.errors[axis] for step in estimated if step.errors is not None], name, unit)
+            errors = [step.errors[axis] for step in estimated if step.errors is not None]
+            row |= _error_columns(errors, name, unit)
+            row[f"{name}_error_correlation"] = _correlation(errors)
             # The measurement that starts a filter is compared with nothing, so it is left out; No filter tests nothing.
             tested = [] if self._cell.estimator == "none" else estimated[1:]
             row |= _consistency_columns([step for step in tested if step.actions[axis] != "miss"], axis, name)
@@ -207,6 +211,16 @@ def _error_columns(errors: Sequence[float], name: str, unit: str) -> Row:
         tails[0]: len(outliers) / len(errors),
         tails[1]: outlier_squares / squares if squares > 0.0 else 0.0,
     }
+
+
+def _correlation(errors: Sequence[float]) -> float | None:
+    """Correlation of an error with the one a step before: near 1, a filter cannot average it away."""
+    if not errors:
+        return None
+    mean = math.fsum(errors) / len(errors)
+    squares = math.fsum((error - mean) ** 2 for error in errors)
+    products = math.fsum((a - mean) * (b - mean) for a, b in pairwise(errors))
+    return products / squares if squares > 0.0 else None
 
 
 def _consistency_columns(updates: Sequence[_Step], axis: int, name: str) -> Row:

@@ -14,7 +14,7 @@ _PERCEPTIONS = {
     "emulated": "truth through a measurement model, whose scale alone is fitted to the paper's No filter row",
     "mask": "rendered RGB-D, ground-truth box and the real depth path; nothing is fitted",
 }
-_VERDICT = {-1: "yes", 0: "undecided", 1: "no"}
+_VERDICT = {True: "yes", None: "undecided", False: "no"}
 
 
 def report(table: Table1) -> str:
@@ -103,8 +103,9 @@ def _hypotheses(table: Table1, perception: str) -> str:
             row = [scene, f"{quantity} ({UNITS[quantity]})"]
             differences = [table.difference(perception, scene, quantity, *pair) for pair in HYPOTHESES]
             for difference in differences:
-                row += [_difference(difference, quantity), _VERDICT[difference.sign]]
-            row.append(_VERDICT[max(difference.sign for difference in differences)])
+                row += [_difference(difference, quantity), _VERDICT[difference.negative]]
+            outcomes = [difference.negative for difference in differences]
+            row.append(_VERDICT[False if False in outcomes else None if None in outcomes else True])
             rows.append(row)
     return markdown_table(header, rows, left=2)
 

@@ -33,12 +33,12 @@ class Difference:
     interval: Interval | None
 
     @property
-    def sign(self) -> int:
-        """-1 or 1 when the whole interval lies below or above zero, 0 when it does not decide."""
+    def negative(self) -> bool | None:
+        """True when the whole interval lies below zero, False when none of it does, None when it does not decide."""
         if self.interval is None:
-            return 0
+            return None
         low, high = self.interval
-        return -1 if high < 0.0 else 1 if low > 0.0 else 0
+        return True if high < 0.0 else False if low >= 0.0 else None
 
 
 @dataclass(frozen=True)

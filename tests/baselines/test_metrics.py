@@ -67,6 +67,17 @@ def test_estimation_errors_agree_with_numpy() -> None:
     assert row["angle_outlier_share"] < 0.01
 
 
+@pytest.mark.parametrize("correlation", [0.0, 0.6, 0.95])
+def test_the_correlation_of_successive_errors(correlation: float) -> None:
+    draws = np.random.default_rng(3).normal(size=(20_000, 2))
+    errors = np.zeros((20_000, 2))
+    for k in range(1, 20_000):
+        errors[k] = correlation * errors[k - 1] + 0.01 * draws[k]
+    row = finish([(info(k), estimate(0.1 + error[0], 1.4 + error[1])) for k, error in enumerate(errors)])
+    for name in ("angle", "distance"):
+        assert row[f"{name}_error_correlation"] == pytest.approx(correlation, abs=0.02)
+
+
 @pytest.mark.parametrize("share", [0.0, 0.05, 0.5, 0.95, 1.0])
 @pytest.mark.parametrize("size", [1, 2, 7, 100])
 def test_quantiles_agree_with_numpy(share: float, size: int) -> None:

@@ -83,7 +83,7 @@ def test_the_interval_of_a_difference_is_paired_and_agrees_with_scipy() -> None:
     assert difference.interval == pytest.approx((expected.low, expected.high), abs=0.04 * width)
     low, high = pooled(errors).interval or (0.0, 0.0)
     assert width < 0.2 * (high - low)
-    assert (difference.value, difference.sign) == (pytest.approx(-0.1 * pooled(errors).rmse), -1)
+    assert (difference.value, difference.negative) == (pytest.approx(-0.1 * pooled(errors).rmse), True)
 
 
 def test_the_interval_covers_the_truth_as_often_as_it_says() -> None:
@@ -120,9 +120,12 @@ def test_the_same_cell_differs_from_itself_by_nothing() -> None:
     assert pooled(cell(7)).minus(pooled(cell(7))) == Difference(0.0, (0.0, 0.0))
 
 
-@pytest.mark.parametrize(("interval", "sign"), [((-2.0, -1.0), -1), ((-2.0, 1.0), 0), ((1.0, 2.0), 1), (None, 0)])
-def test_only_an_interval_on_one_side_of_zero_decides(interval, sign: int) -> None:
-    assert Difference(-0.5, interval).sign == sign
+@pytest.mark.parametrize(
+    ("interval", "negative"),
+    [((-2.0, -1.0), True), ((-2.0, 1.0), None), ((1.0, 2.0), False), ((0.0, 0.0), False), (None, None)],
+)
+def test_only_an_interval_on_one_side_of_zero_decides(interval, negative: bool | None) -> None:
+    assert Difference(-0.5, interval).negative is negative
 
 
 def test_one_episode_gives_no_interval() -> None:

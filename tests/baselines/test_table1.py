@@ -1,0 +1,494 @@
+"""A whole reproduction: the same files however it is run or killed, and a table that says what the episodes say."""
+
+import csv
+import functools
+import hashlib
+import importlib
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from baselines.benchmark import reproduce as reproduction
+from baselines.benchmark.cells import Cell
+from baselines.benchmark.configuration import Plan, digest, settings
+from baselines.benchmark.curves import curve_records
+from baselines.benchmark.explain import explain
+from baselines.benchmark.files import write_text
+from baselines.benchmark.metrics import Row
+from baselines.benchmark.report import markdown_table, report
+from baselines.benchmark.reproduce import Interrupted, reproduce
+from baselines.benchmark.store import FILE_NAME, InputError, Store
+from baselines.benchmark.table1 import COLUMNS, PAPER_RMSE, Table1, paper_ratio
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).parent
+REPRODUCIBLE = {
+    *("episodes.csv", "table1.csv", "table1.md", "curves.csv"),
+    *("sensitivity.csv", "sensitivity_episodes.csv", "family.csv", "family_episodes.csv"),
+}
+
+
+@pytest.fixture(scope="module")
+def synthetic() -> ModuleType:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(HERE)
+        yield importlib.import_module("synthetic")
+
+
+def run(synthetic: ModuleType, out: Path, episodes: int = 4, resume: bool = False, jobs: int = 1, **changes) -> str:
+    plan = changes.get("plan") or Plan.of(["emulated"], episodes, list(synthetic.SENSORS))
+    calibration = changes.get("calibration", synthetic.CALIBRATION)
+    return reproduce(plan, calibration, changes.get("episode", synthetic.episode), out, jobs, resume)
+
+
+@pytest.fixture(scope="module")
+def finished(synthetic: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An uninterrupted run of 4 episodes in one process."""
+    out = tmp_path_factory.mktemp("table1") / "finished"
+    run(synthetic, out)
+    return out
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name in REPRODUCIBLE}
+
+
+def records(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def everything(folder: Path) -> dict[str, str]:
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_a_run_writes_all_it_promises(finished: Path) -> None:
+    names = {path.name for path in finished.iterdir()}
+    assert names == REPRODUCIBLE | {"config.json", "timing.csv", "figures", FILE_NAME}
+    pictures = {path.name for path in (finished / "figures").iterdir()}
+    assert pictures == {
+        "figure6_corridor_angle_emulated.png",
+        "figure7_corridor_distance_emulated.png",
+        "figure8_indoor_angle_emulated.png",
+        "figure9_indoor_distance_emulated.png",
+        "sensitivity.png",
+        "family.png",
+    }
+    text = (finished / "table1.md").read_text(encoding="utf-8")
+    assert {name for name in pictures if f"(figures/{name})" in text} == pictures
+
+
+def test_two_processes_write_the_same_bytes_as_one(synthetic: ModuleType, finished: Path, tmp_path: Path) -> None:
+    run(synthetic, tmp_path / "two", jobs=2)
+    assert files(tmp_path / "two") == files(finished)
+
+
+def test_a_run_killed_again_and_again_ends_with_the_same_bytes(finished: Path, tmp_path: Path) -> None:
+    out = tmp_path / "killed"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(HERE)])}
+    generator = random.Random(1)
+    tasks = 2 * (4 * 4 + (5 + 15 - 2) * 2 + 2 * 3 * 2)
+    kept = []
+    for attempt in range(60):
+        command = [sys.executable, "-m", "synthetic", str(out), "4", str(1 + attempt % 2), "0.02"]
+        with subprocess.Popen(
+            command if attempt == 0 else [*command, "resume"], env=environment, stderr=subprocess.DEVNULL
+        ) as process:
+            deadline = time.monotonic() + generator.uniform(1.0, 2.5)
+            while process.poll() is None and time.monotonic() < deadline:
+                time.sleep(0.01)
+            process.send_signal(signal.SIGKILL)
+        if (out / FILE_NAME).exists():
+            with Store(out, digest_of_the_store(out)) as store:
+                kept.append(len(store))
+        if process.returncode == 0:
+            break
+    assert process.returncode == 0
+    assert kept == sorted(kept)
+    assert 3 <= len([count for count in kept if 0 < count < tasks])
+    assert kept[-1] == tasks
+    assert files(out) == files(finished)
+    assert not list(out.glob(".*"))
+
+
+def digest_of_the_store(out: Path) -> str:
+    return json.loads((out / "config.json").read_text(encoding="utf-8"))["settings_sha256"]
+
+
+def test_resuming_takes_exactly_the_seeds_that_are_asked_for(
+    synthetic: ModuleType, finished: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    run(synthetic, out, episodes=6)
+    assert len(records(out / "episodes.csv")) == 8 * 6
+    run(synthetic, out, episodes=4, resume=True)
+    assert files(out) == files(finished)
+    played = []
+
+    def counted(cell: Cell, seed: int):
+        played.append((cell, seed))
+        return synthetic.episode(cell, seed)
+
+    run(synthetic, out, episodes=7, resume=True, episode=counted)
+    assert {seed for _, seed in played} == {6}
+    assert [int(row["seed"]) for row in records(out / "episodes.csv")] == [*range(7)] * 8
+
+
+def test_resuming_a_finished_run_plays_nothing(synthetic: ModuleType, finished: Path, tmp_path: Path) -> None:
+    out = tmp_path / "copy"
+    shutil.copytree(finished, out)
+    run(synthetic, out, resume=True, episode=None)
+    assert files(out) == files(finished)
+
+
+def test_without_resume_what_is_there_is_kept(synthetic: ModuleType, finished: Path) -> None:
+    before = everything(finished)
+    with pytest.raises(InputError, match=r"already holds \d+ episodes .*--resume.*--out\.$"):
+        run(synthetic, finished)
+    assert everything(finished) == before
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_another_configuration_is_refused_and_nothing_is_lost(
+    synthetic: ModuleType, finished: Path, resume: bool
+) -> None:
+    before = everything(finished)
+    with pytest.raises(InputError, match=r"episodes of another configuration .*--out\.$"):
+        run(synthetic, finished, resume=resume, calibration={"sensor": "another"})
+    assert everything(finished) == before
+
+
+@pytest.mark.parametrize("resume", [False, True])
+@pytest.mark.parametrize("store", ["missing", "empty", "damaged"])
+def test_results_whose_store_is_gone_are_not_overwritten(
+    synthetic: ModuleType, finished: Path, tmp_path: Path, store: str, resume: bool
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(finished, out)
+    if store == "missing":
+        (out / FILE_NAME).unlink()
+    else:
+        (out / FILE_NAME).write_bytes(b"" if store == "empty" else b"no database" * 1000)
+    before = everything(out)
+    with pytest.raises(InputError, match=r"--out\.$"):
+        run(synthetic, out, resume=resume)
+    assert everything(out) == before
+
+
+def test_a_file_in_the_folders_place_is_refused(synthetic: ModuleType, tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("mine", encoding="utf-8")
+    for out in (tmp_path / "taken", tmp_path / "taken" / "below"):
+        with pytest.raises(InputError, match=r"cannot be written .*--out\.$"):
+            run(synthetic, out)
+    assert (tmp_path / "taken").read_text(encoding="utf-8") == "mine"
+
+
+def test_an_interrupted_run_says_what_it_kept(synthetic: ModuleType, finished: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    calls = iter(range(10**6))
+
+    def interrupted(cell: Cell, seed: int):
+        if next(calls) == 5:
+            raise KeyboardInterrupt
+        return synthetic.episode(cell, seed)
+
+    with pytest.raises(
+        Interrupted, match=r"5 of \d+ episodes are kept in .*out; the same command with --resume goes on"
+    ):
+        run(synthetic, out, episode=interrupted)
+    run(synthetic, out, resume=True)
+    assert files(out) == files(finished)
+
+
+def test_a_file_is_the_old_one_until_the_new_one_is_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "table.csv"
+    write_text(path, "old")
+    write = Path.write_bytes
+
+    def half(self: Path, content: bytes) -> None:
+        write(self, content[: len(content) // 2])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", half)
+    with pytest.raises(OSError, match="No space"):
+        write_text(path, "new content")
+    assert path.read_text(encoding="utf-8") == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_full_disk_is_one_sentence(synthetic: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(reproduction, "write_csv", full)
+    with pytest.raises(InputError, match=r"cannot be written \(No space left on device\)"):
+        run(synthetic, tmp_path / "out")
+
+
+def test_config_names_what_made_the_results(synthetic: ModuleType, finished: Path) -> None:
+    config = json.loads((finished / "config.json").read_text(encoding="utf-8"))
+    canonical = json.dumps(config["settings"], sort_keys=True, separators=(",", ":"))
+    assert config["settings_sha256"] == hashlib.sha256(canonical.encode()).hexdigest()
+    assert config["settings"]["calibration"] == synthetic.CALIBRATION
+    assert len(config["settings"]["cells"]["table1"]) == 8
+    assert config["seeds"] == {"table1/emulated": [0, 1, 2, 3], "studies": [0, 1]}
+    assert config["packages"]["numpy"] == np.__version__
+    assert {"platform", "python", "cpu"} <= config["machine"].keys()
+    assert str(finished.parent) not in json.dumps(config)
+
+
+def test_the_hash_covers_what_changes_results_and_nothing_else() -> None:
+    base = Plan.of(["emulated"], 4, ["white"])
+    same = digest(settings(Plan.of(["emulated"], 50, ["white"]), {"r": 1.0}))
+    assert digest(settings(base, {"r": 1.0})) == same
+    assert digest(settings(base, {"r": 1.1})) != same
+    assert digest(settings(Plan.of(["emulated"], 4, ["bursts"]), {"r": 1.0})) != same
+    assert digest(settings(Plan.of(["emulated", "mask"], 4, ["white"]), {"r": 1.0})) != same
+
+
+def test_raw_rows_read_back_as_the_very_floats(synthetic: ModuleType, finished: Path) -> None:
+    rows = records(finished / "episodes.csv")
+    expected = synthetic.episode(Cell("emulated", "indoor", "akf"), 2).row
+    (row,) = [row for row in rows if (row["scene"], row["estimator"], row["seed"]) == ("indoor", "akf", "2")]
+    for name, value in expected.items():
+        assert row[name] == ("" if value is None else repr(value) if isinstance(value, float) else str(value))
+
+
+def test_table_1_is_what_the_raw_rows_say(finished: Path) -> None:
+    rows = records(finished / "episodes.csv")
+    table = records(finished / "table1.csv")
+    assert tuple(table[0]) == COLUMNS
+    assert len(table) == 2 * 4 * 2
+    by_cell = {(line["scene"], line["quantity"], line["estimator"]): line for line in table}
+    for (scene, quantity, estimator), line in by_cell.items():
+        unit, scale = {"angle": ("rad", 1.0), "distance": ("m", 100.0)}[quantity]
+        chosen = [row for row in rows if (row["scene"], row["estimator"]) == (scene, estimator)]
+        steps = np.array([float(row["estimate_steps"]) for row in chosen])
+        rmse = scale * np.array([float(row[f"{quantity}_rmse_{unit}"]) for row in chosen])
+        bias = scale * np.array([float(row[f"{quantity}_bias_{unit}"]) for row in chosen])
+        assert float(line["rmse"]) == pytest.approx(np.sqrt(np.average(rmse**2, weights=steps)), rel=1e-5)
+        assert float(line["bias"]) == pytest.approx(np.average(bias, weights=steps), rel=1e-5)
+        assert float(line["rmse"]) ** 2 == pytest.approx(
+            float(line["bias"]) ** 2 + float(line["spread"]) ** 2, rel=1e-4
+        )
+        assert float(line["ci_low"]) <= float(line["rmse"]) <= float(line["ci_high"])
+        assert (line["unit"], line["episodes"]) == ({"angle": "rad", "distance": "cm"}[quantity], "4")
+        for reference, ratio, difference in (("none", "ratio_to_none", "diff_to_none"), ("kf", None, "diff_to_kf")):
+            other = float(by_cell[scene, quantity, reference]["rmse"])
+            if estimator == "none" or estimator == reference:
+                assert line[difference] == ""
+                continue
+            assert float(line[difference]) == pytest.approx(float(line["rmse"]) - other, abs=2e-5 * other)
+            if ratio:
+                assert float(line[ratio]) == pytest.approx(float(line["rmse"]) / other, rel=2e-5)
+
+
+def test_the_papers_values_stand_beside(finished: Path) -> None:
+    table = {(line["scene"], line["quantity"], line["estimator"]): line for line in records(finished / "table1.csv")}
+    assert table["corridor", "distance", "none"]["paper_rmse"] == "15.3191"
+    assert table["indoor", "angle", "akf"]["paper_rmse"] == "0.0112"
+    assert all(table[scene, quantity, "akf_cv"]["paper_rmse"] == "" for scene, quantity, _ in PAPER_RMSE)
+    ratios = [
+        round(paper_ratio(scene, quantity, estimator) or 0.0, 2)
+        for quantity in ("distance", "angle")
+        for scene in ("corridor", "indoor")
+        for estimator in ("kf", "akf")
+    ]
+    assert ratios == [0.83, 0.78, 0.59, 0.37, 0.62, 0.57, 0.68, 0.65]
+
+
+def test_the_studies_hold_every_combination(finished: Path) -> None:
+    sensitivity = records(finished / "sensitivity.csv")
+    points = {
+        (line["scene"], line["quantity"], line["estimator"], line["q_scale"], line["alpha"]) for line in sensitivity
+    }
+    assert len(points) == len(sensitivity) == 2 * 2 * (1 + 5 + 15)
+    assert {line["alpha"] for line in sensitivity if line["estimator"] == "akf"} == {"0.01", "0.05", "0.1"}
+    family = records(finished / "family.csv")
+    assert len(family) == 3 * 2 * 2 * 3
+    assert [*dict.fromkeys(line["sensor"] for line in family)] == ["fitted", "clean", "heavy_tails"]
+    for line in (*sensitivity, *family):
+        assert (line["ratio_to_none"] == "") == (line["estimator"] == "none")
+
+
+def test_curves_are_means_and_bands_over_episodes_ten_times_a_second() -> None:
+    time_s = np.arange(91) / 30.0
+    cell = Cell("emulated", "indoor", "kf")
+    episodes = [np.column_stack([time_s, slope * time_s, 0.1 * slope * time_s]) for slope in np.linspace(1.0, 2.0, 11)]
+    lines = [line for line in curve_records({cell: episodes}) if line["quantity"] == "distance"]
+    assert [line["time_s"] for line in lines] == [index / 10 for index in range(31)]
+    assert [line["mean"] for line in lines] == pytest.approx([15.0 * index / 10 for index in range(31)])
+    assert [line["p10"] for line in lines] == pytest.approx([11.0 * index / 10 for index in range(31)])
+    assert [line["p90"] for line in lines] == pytest.approx([19.0 * index / 10 for index in range(31)])
+
+
+def test_a_curve_stops_where_fewer_than_half_of_the_episodes_are_left() -> None:
+    long, short = (np.column_stack([np.arange(n) / 30.0, np.ones(n), np.ones(n)]) for n in (91, 31))
+    lines = curve_records({Cell("mask", "indoor", "kf"): [long, short, short]})
+    angle = [line for line in lines if line["quantity"] == "angle"]
+    assert angle[-1]["time_s"] == 1.0
+    lines = curve_records({Cell("mask", "indoor", "kf"): [long, long, short]})
+    assert [line["episodes"] for line in lines if line["quantity"] == "angle"] == [3] * 11 + [2] * 20
+
+
+def made(bias: dict[str, float], spread: dict[str, float], **columns: float) -> Table1:
+    """A table whose distances have the given bias and spread, m, by estimator, and whose angles follow the paper."""
+    generator = np.random.default_rng(0)
+    factors = generator.uniform(0.95, 1.05, 40)
+    rows: dict[Cell, list[Row]] = {}
+    for scene in ("corridor", "indoor"):
+        for estimator in ("none", "kf", "akf", "akf_cv"):
+            paper = PAPER_RMSE.get((scene, "angle", estimator), 0.01)
+            rows[Cell("emulated", scene, estimator)] = [
+                {
+                    "estimate_steps": 400,
+                    "ended": "time",
+                    "success": 1,
+                    "angle_rmse_rad": float(paper * factor),
+                    "angle_bias_rad": 0.0,
+                    "distance_rmse_m": float(np.hypot(bias[estimator], spread[estimator]) * factor),
+                    "distance_bias_m": float(bias[estimator] * factor),
+                    **dict.fromkeys(("in_band_share", "measurement_share"), 1.0),
+                    **dict.fromkeys(("angle_inflated_share", "distance_inflated_share"), 0.05),
+                    **dict.fromkeys(("angle_outlier_share", "distance_outlier_share"), 0.01),
+                    **dict.fromkeys(("angle_outlier_square_share", "distance_outlier_square_share"), 0.05),
+                    **dict.fromkeys(("angle_error_correlation", "distance_error_correlation"), 0.9),
+                    **columns,
+                }
+                for factor in factors
+            ]
+    return Table1(rows)
+
+
+def test_a_cell_as_in_the_paper_needs_no_explanation() -> None:
+    table = made(
+        dict.fromkeys(("none", "kf", "akf", "akf_cv"), 0.0), {"none": 0.1, "kf": 0.083, "akf": 0.078, "akf_cv": 0.07}
+    )
+    assert explain(table, "emulated", "corridor", "angle") is None
+    assert explain(table, "emulated", "corridor", "distance") is not None  # 10 cm is not the paper's 15 cm ...
+    text = report(table)
+    line = next(line for line in text.splitlines() if line.startswith("| corridor | distance |"))
+    assert line.split() == "| corridor | distance | 0.83 | 0.83 | yes | 0.78 | 0.78 | yes |".split()
+
+
+def test_bias_that_dominates_is_named_with_its_share_and_the_lag() -> None:
+    bias = {"none": -0.112, "kf": -0.18, "akf": -0.18, "akf_cv": -0.112}
+    spread = {"none": 0.05, "kf": 0.03, "akf": 0.03, "akf_cv": 0.03}
+    text = explain(made(bias, spread), "emulated", "corridor", "distance")
+    assert text is not None
+    assert "KF < No filter does not hold; AKF < KF does not hold; the KF ratio is 1.49 (paper 0.83)" in text
+    assert "Bias (-11.20 cm) makes 83% of No filter's squared error" in text
+    assert "without any spread the ratio would still be 0.91" in text
+    assert (
+        "The KF takes bias from -11.20 to -18.00 cm and spread from 5.00 to 3.00 cm: more bias added than spread removed."
+        in text
+    )
+    assert "The AKF finds no outlier in any episode and does what the KF does." in text
+    assert "Successive errors of No filter correlate by 0.90: they change too slowly" in text
+    assert "carry 5% of its squared error, which leaves the AKF little to reject" in text
+
+
+def test_hypotheses_are_yes_no_or_undecided_by_their_intervals() -> None:
+    names = ("none", "kf", "akf", "akf_cv")
+    decided = report(made(dict.fromkeys(names, 0.0), dict(zip(names, (0.2, 0.1, 0.05, 0.05), strict=True))))
+    refuted = report(made(dict.fromkeys(names, 0.0), dict(zip(names, (0.1, 0.2, 0.05, 0.05), strict=True))))
+    for text, verdicts in ((decided, ["yes", "yes", "yes"]), (refuted, ["no", "yes", "no"])):
+        line = next(
+            line
+            for line in text.splitlines()
+            if line.startswith("| indoor   | distance (cm) |") and "to" in line and line.count("|") == 8
+        )
+        assert [part.strip() for part in line.split("|")[4:8:2] + line.split("|")[7:8]] == verdicts
+
+
+def test_one_episode_decides_nothing(synthetic: ModuleType, tmp_path: Path) -> None:
+    text = run(synthetic, tmp_path / "out", episodes=1)
+    assert "undecided" in text
+    assert "| yes |" not in text.split("### Ratios")[0]
+    (line,) = [
+        line
+        for line in records(tmp_path / "out" / "table1.csv")
+        if (line["scene"], line["estimator"], line["quantity"]) == ("indoor", "kf", "angle")
+    ]
+    assert (line["episodes"], line["ci_low"], line["diff_none_low"]) == ("1", "", "")
+    assert float(line["ratio_to_none"]) > 0.0
+
+
+def test_perfect_measurements_have_no_ratio(synthetic: ModuleType, tmp_path: Path) -> None:
+    text = run(synthetic, tmp_path / "out", plan=Plan.of(["truth"], 2, []))
+    assert "No filter makes no error on perfect measurements" in text
+    table = records(tmp_path / "out" / "table1.csv")
+    assert {line["ratio_to_none"] for line in table} == {""}
+    assert not (tmp_path / "out" / "sensitivity.csv").exists()
+
+
+def test_a_markdown_table_is_aligned() -> None:
+    text = markdown_table(["name", "value"], [["a", "1.00"], ["longer", "-10.00"]], left=1)
+    assert text.splitlines() == [
+        "| name   |  value |",
+        "|--------|-------:|",
+        "| a      |   1.00 |",
+        "| longer | -10.00 |",
+    ]
+
+
+@pytest.mark.slow
+def test_real_results_do_not_depend_on_processes_or_on_the_cpus_features(tmp_path: Path) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "baselines.cli",
+        "reproduce",
+        "table1",
+        "--perception",
+        "emulated",
+        "--episodes",
+        "1",
+    ]
+    for name, jobs, features in (("one", "1", ""), ("two", "2", "AVX512F AVX512_SKX AVX2 FMA3")):
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "NPY_DISABLE_CPU_FEATURES": features}
+        subprocess.run(
+            [*command, "--jobs", jobs, "--out", str(tmp_path / name)], env=environment, check=True, capture_output=True
+        )
+    assert files(tmp_path / "one") == files(tmp_path / "two")
+    assert len(files(tmp_path / "one")) == len(REPRODUCIBLE)
+
+
+@pytest.mark.slow
+def test_the_pictures_that_are_rendered_do_not_depend_on_the_cpus_features(tmp_path: Path) -> None:
+    script = (
+        "from baselines.benchmark.cells import Cell\n"
+        "from baselines.benchmark.episodes import Player\n"
+        "episode = Player()(Cell('mask', 'indoor', 'akf'), 0)\n"
+        "print(sorted(episode.row.items(), key=str), episode.curve.tobytes().hex()[-500:])\n"
+    )
+    outputs = {
+        subprocess.run(
+            [sys.executable, "-c", script],
+            env={**os.environ, "PYTHONPATH": str(ROOT), "NPY_DISABLE_CPU_FEATURES": features},
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+        for features in ("", "AVX512F AVX512_SKX AVX2 FMA3")
+    }
+    assert len(outputs) == 1
+
+
+def test_a_partial_function_is_an_episode_function(synthetic: ModuleType) -> None:
+    shorter = functools.partial(synthetic.episode, seconds=1.0)
+    assert shorter(Cell("emulated", "indoor", "kf"), 0).row["steps"] == 31

@@ -1,0 +1,450 @@
+"""Camera, depth sensor and the person that is seen: pictures against geometry computed here."""
+
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+
+import follow_env
+from follow_env.camera import CameraPose, PinholeCamera, make_renderer
+from follow_env.camera.depth import DepthSensor
+from follow_env.config import CameraConfig, DepthConfig
+from follow_env.person import body, gait
+from follow_env.physics import PERSON_RADIUS
+from follow_env.scene import Box, Light, Material, Scene
+
+GREY = Material((0.5, 0.5, 0.5))
+LAMP = (Light((0.0, 0.0, 3.0), 1.0),)
+CAMERA = PinholeCamera(CameraConfig())
+SMALL = PinholeCamera(CameraConfig(width=80, height=60))
+POSES = {
+    "origin": CameraPose(0.0, 0.0, 1.0, 0.0),
+    "turned": CameraPose(1.5, -0.7, 0.8, 0.6),
+    "backwards": CameraPose(-2.0, 1.0, 1.3, 3.0),
+}
+NOBODY = gait.pose(-500.0, 0.0, 0.0, 0.0, 0.0)
+EXACT = DepthConfig(axial_noise=0.0, disparity_step=0.0, min_range=0.0, max_range=math.inf, edge_band=0)
+XTION_HFOV = math.radians(57.5)
+PHASES = np.linspace(0.0, 1.0, 48, endpoint=False)
+
+
+def scene(*boxes):
+    return Scene("test", boxes, GREY, LAMP, 0.5, (-20.0, 20.0, -20.0, 20.0))
+
+
+def picture(camera, pose, boxes, person=None):
+    renderer = make_renderer("tiny", scene(*boxes), camera, "blue")
+    frame = renderer.render(pose, NOBODY if person is None else person)
+    renderer.close()
+    return frame
+
+
+def world_point(pose, ahead, left, up):
+    """The world point so far ahead, left and up of the camera, m."""
+    cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
+    return pose.x + cosine * ahead - sine * left, pose.y + sine * ahead + cosine * left, pose.z + up
+
+
+def plate(pose, ahead, left, up, size=0.3):
+    """A thin square plate that faces the camera, with its front at the given place."""
+    centre = world_point(pose, ahead + 0.0005, left, up)
+    return Box(centre, (0.001, size, size), GREY, yaw=pose.yaw)
+
+
+@pytest.mark.parametrize("pose", POSES.values(), ids=POSES)
+@pytest.mark.parametrize(
+    ("ahead", "left", "up"),
+    [(2.0, 0.0, 0.0), (2.5, 0.8, 0.5), (2.5, -0.8, -0.3), (4.0, 1.2, -0.6), (6.0, -2.0, 1.2)],
+)
+def test_a_point_appears_where_the_intrinsics_say(pose, ahead, left, up):
+    """The centroid of a plate's pixels is the projection of its centre, to a tenth of a pixel and 5 mm of depth.
+
+    A plate that faces the camera is imaged without distortion, so its centroid is the image of its centre.
+    """
+    empty = picture(CAMERA, pose, ())
+    frame = picture(CAMERA, pose, (plate(pose, ahead, left, up),))
+    rows, columns = np.nonzero(frame.depth < empty.depth - 0.05)
+    assert len(rows) > 30
+    u, v, z = CAMERA.project(pose, world_point(pose, ahead, left, up))
+    assert z == pytest.approx(ahead)
+    assert (columns + 0.5).mean() == pytest.approx(u, abs=0.1 + 0.5 / math.sqrt(len(rows)))
+    assert (rows + 0.5).mean() == pytest.approx(v, abs=0.1 + 0.5 / math.sqrt(len(rows)))
+    assert frame.depth[rows, columns] == pytest.approx(ahead, abs=0.005)
+
+
+def test_the_picture_is_not_shifted_on_average():
+    """Over 60 random plates the mean difference of centroid and projection is below 0.05 px: no half-pixel shift."""
+    rng, differences = np.random.default_rng(0), []
+    for _ in range(60):
+        pose = CameraPose(*rng.uniform(-3.0, 3.0, 2).tolist(), 1.0, float(rng.uniform(-3.0, 3.0)))
+        ahead = float(rng.uniform(1.5, 4.0))
+        left, up = (float(share) * ahead for share in rng.uniform((-0.4, -0.2), (0.4, 0.25)))
+        empty, frame = picture(SMALL, pose, ()), picture(SMALL, pose, (plate(pose, ahead, left, up),))
+        rows, columns = np.nonzero(frame.depth < empty.depth - 0.05)
+        u, v, _ = SMALL.project(pose, world_point(pose, ahead, left, up))
+        differences.append(((columns + 0.5).mean() - u, (rows + 0.5).mean() - v))
+    assert np.abs(np.mean(differences, axis=0)).max() < 0.05
+
+
+def test_left_is_left_and_up_is_up():
+    pose = POSES["turned"]
+    u, v, _ = CAMERA.project(pose, world_point(pose, 2.0, 0.5, 0.3))
+    assert u < CAMERA.cx
+    assert v < CAMERA.cy
+
+
+@pytest.mark.parametrize("pose", POSES.values(), ids=POSES)
+@pytest.mark.parametrize("distance", [0.6, 1.5, 3.0, 7.5, 15.0])
+def test_a_wall_ahead_has_its_distance_in_metres(pose, distance):
+    """To 1 cm as asked of every renderer; the depth is along the optical axis, so the whole wall reads alike."""
+    wall = Box(world_point(pose, distance + 0.05, 0.0, 0.0), (0.1, 40.0, 40.0), GREY, yaw=pose.yaw)
+    frame = picture(SMALL, pose, (wall,))
+    upper = frame.depth[: SMALL.height // 2]
+    assert upper == pytest.approx(distance, abs=0.01)
+
+
+def test_nothing_ahead_reads_the_far_plane_and_no_more():
+    for near, far in ((0.1, 30.0), (0.05, 25.0), (0.3, 47.0)):
+        camera = PinholeCamera(CameraConfig(width=16, height=12, near=near, far=far))
+        depth = picture(camera, CameraPose(19.0, 0.0, 1.0, 0.0), ()).depth
+        assert depth[0] == pytest.approx(far, rel=1e-4)
+        assert depth.max() <= np.float32(far)
+
+
+def test_the_matrices_say_the_same_as_project():
+    """Clip coordinates of a point by the two OpenGL matrices against `project`: picture position and depth buffer."""
+    rng = np.random.default_rng(1)
+    for pose in POSES.values():
+        view = np.array(CAMERA.view_matrix(pose)).reshape(4, 4).T
+        projection = np.array(CAMERA.projection_matrix()).reshape(4, 4).T
+        assert view[:3, :3] @ view[:3, :3].T == pytest.approx(np.eye(3), abs=1e-12)
+        assert np.linalg.det(view[:3, :3]) == pytest.approx(1.0)
+        for ahead, across, up in rng.uniform((0.3, -0.6, -0.4), (9.0, 0.6, 0.4), (20, 3)):
+            point = world_point(pose, ahead, across * ahead, up * ahead)
+            clip = projection @ view @ np.array((*point, 1.0))
+            x, y, _ = clip[:3] / clip[3]
+            u, v, z = CAMERA.project(pose, point)
+            assert (0.5 * (x + 1.0) * CAMERA.width, 0.5 * (1.0 - y) * CAMERA.height) == pytest.approx((u, v))
+            assert clip[3] == pytest.approx(z)
+
+
+def test_a_point_behind_the_camera_is_one_clear_error():
+    with pytest.raises(ValueError, match=r"behind the camera .*expected depth > 0"):
+        CAMERA.project(POSES["origin"], (-1.0, 0.0, 1.0))
+
+
+def test_the_edge_of_the_picture_lies_at_half_the_field_of_view():
+    pose = POSES["origin"]
+    u, _, _ = CAMERA.project(pose, world_point(pose, 3.0, 3.0 * math.tan(math.radians(28.75)), 0.0))
+    assert u == pytest.approx(0.0, abs=1e-9)
+
+
+def vertices(person, clothes="blue"):
+    """World vertices of every segment by name: each mesh moved by its pose's quaternion and position."""
+    placed = {}
+    for segment, (position, (x, y, z, w)) in zip(body.segments(clothes), person, strict=True):
+        axis = np.array((x, y, z))
+        assert x * x + y * y + z * z + w * w == pytest.approx(1.0)
+        points, _, _ = segment.mesh()
+        turned = points + 2.0 * np.cross(axis, np.cross(axis, points) + w * points)
+        placed[segment.name] = turned + np.array(position)
+    return placed
+
+
+@pytest.mark.parametrize("pose", POSES.values(), ids=POSES)
+@pytest.mark.parametrize(("ahead", "left"), [(1.5, 0.0), (2.5, 0.6), (4.0, -1.0)])
+def test_the_persons_pixels_fill_the_projection_of_the_body(pose, ahead, left):
+    """The box of the id mask against the projected vertices, clipped to the picture: within a pixel."""
+    x, y, _ = world_point(pose, ahead, left, 0.0)
+    person = gait.pose(x, y, pose.yaw + 0.4, 3.3, 0.9)
+    frame = picture(CAMERA, pose, (), person)
+    corners = np.array([CAMERA.project(pose, tuple(point))[:2] for point in np.vstack([*vertices(person).values()])])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    limit = (CAMERA.width, CAMERA.height)
+    wanted = (*np.clip(low, 0.0, limit), *np.clip(high, 0.0, limit))
+    assert frame.person_box() == pytest.approx(wanted, abs=1.0)
+    assert set(np.unique(frame.ids)) == {0, 1}
+
+
+def test_the_persons_pixels_have_the_persons_depth_and_colour():
+    pose = POSES["origin"]
+    x, y, _ = world_point(pose, 2.0, 0.0, 0.0)
+    frames = {
+        clothes: make_renderer("tiny", scene(), CAMERA, clothes).render(pose, gait.pose(x, y, 0.0, 0.0, 0.0))
+        for clothes in body.CLOTHES
+    }
+    for frame in frames.values():
+        depth = frame.depth[frame.ids == 1]
+        assert depth.min() > 2.0 - 0.30
+        assert depth.max() < 2.0 + 0.30
+        assert np.median(depth) == pytest.approx(2.0 - 0.10, abs=0.06)
+    shirts = {clothes: frame.rgb[50:70, 76:84].reshape(-1, 3).mean(axis=0) for clothes, frame in frames.items()}
+    assert shirts["blue"].argmax() == 2
+    assert shirts["green"].argmax() == 1
+    assert shirts["orange"].argmax() == 0
+
+
+def test_a_person_who_is_not_in_view_has_no_pixels():
+    pose = POSES["origin"]
+    behind = gait.pose(-2.0, 0.0, 0.0, 0.0, 0.0)
+    beside = gait.pose(1.0, 2.0, 0.0, 0.0, 0.0)
+    ahead = gait.pose(3.0, 0.0, 0.0, 0.0, 0.0)
+    wall = Box((1.5, 0.0, 1.0), (0.1, 6.0, 4.0), GREY)
+    assert picture(SMALL, pose, (), behind).person_box() is None
+    assert picture(SMALL, pose, (), beside).person_box() is None
+    assert picture(SMALL, pose, (), ahead).person_box() is not None
+    assert picture(SMALL, pose, (wall,), ahead).person_box() is None
+
+
+def test_the_box_is_tight_and_small_glimpses_can_be_ignored():
+    frame = picture(SMALL, POSES["origin"], (), gait.pose(3.0, 0.0, 0.0, 0.0, 0.0))
+    u0, v0, u1, v1 = (int(edge) for edge in frame.person_box())
+    inside = frame.ids == 1
+    assert inside.sum() == inside[v0:v1, u0:u1].sum()
+    assert inside[v0].any()
+    assert inside[v1 - 1].any()
+    assert inside[:, u0].any()
+    assert inside[:, u1 - 1].any()
+    pixels = int(inside.sum())
+    assert frame.person_box(pixels) == (u0, v0, u1, v1)
+    assert frame.person_box(pixels + 1) is None
+
+
+def test_the_camera_is_carried_by_the_robot_without_jumps():
+    """A swerving drive: the camera stays 10 cm ahead of the axle and moves no faster than the robot can."""
+    env = gymnasium.make(follow_env.IDS["indoor"], route="standing").unwrapped
+    _, info = env.reset(seed=2)
+    before = env.camera_pose()
+    for step in range(120):
+        action = np.array((0.25 * math.sin(0.2 * step), math.cos(0.13 * step)), np.float32)
+        *_, terminated, _, info = env.step(action)
+        assert not terminated
+        camera = env.camera_pose()
+        x, y, yaw = info["robot_pose"]
+        assert (camera.x, camera.y) == pytest.approx((x + 0.10 * math.cos(yaw), y + 0.10 * math.sin(yaw)))
+        assert (camera.z, camera.yaw) == (1.0, yaw)
+        assert math.hypot(camera.x - before.x, camera.y - before.y) < (1.2 + 0.10 * 2.0) * env.dt * 1.02
+        assert abs(math.remainder(camera.yaw - before.yaw, 2.0 * math.pi)) < 2.0 * env.dt * 1.02
+        before = camera
+    env.close()
+
+
+def test_the_picture_follows_the_motion():
+    """Driving at the corridor's wall, the depth in the middle falls by just what the robot moved, every step."""
+    env = gymnasium.make(
+        follow_env.IDS["corridor"], obs="rgbd", route="standing", sensor="ideal", camera={"width": 32, "height": 24}
+    ).unwrapped
+    observation, _ = env.reset(seed=3, options={"robot_pose": (3.0, -1.0, math.pi / 2)})
+    for _ in range(45):
+        *_, info = before = env.step(np.array((0.8, 0.0), np.float32))
+        observation = before[0]
+        assert observation["depth"][12, 16] == pytest.approx(1.8 - info["robot_pose"][1] - 0.10, abs=0.01)
+    assert info["robot_pose"][1] > -0.1
+    env.close()
+
+
+@pytest.mark.parametrize("name", ["corridor", "indoor"])
+def test_visible_agrees_with_the_picture(name):
+    """From random places: who is `visible` has pixels, and who has no pixels is not `visible`."""
+    env = gymnasium.make(
+        follow_env.IDS[name], obs="rgbd", route="standing", camera={"width": 64, "height": 48}
+    ).unwrapped
+    rng, seen = np.random.default_rng(4), []
+    for seed in range(60):
+        place = (float(rng.uniform(-2.0, 12.0)), float(rng.uniform(-1.2, 1.2)), float(rng.uniform(-math.pi, math.pi)))
+        _, info = env.reset(seed=seed, options={"robot_pose": place})
+        pixels = int((env.frame().ids == 1).sum())
+        seen.append(info["visible"])
+        if info["visible"]:
+            assert pixels > 0, (seed, place)
+        if pixels == 0:
+            assert not info["visible"], (seed, place)
+    env.close()
+    assert 5 < sum(seen) < 55
+
+
+@pytest.mark.parametrize("z", [0.6, 1.0, 2.0, 4.0, 7.0])
+def test_axial_noise_grows_as_stated(z):
+    """sigma(z) = 0.0012 + 0.0019 (z - 0.4)^2 m, without bias (quantisation off)."""
+    sensor = DepthSensor(DepthConfig(disparity_step=0.0, edge_band=0), XTION_HFOV)
+    read = sensor.corrupt(np.full((200, 250), z, np.float32), np.random.default_rng(5)).astype(float)
+    sigma = 0.0012 + 0.0019 * (z - 0.4) ** 2
+    assert (read > 0.0).all()
+    assert read.std() == pytest.approx(sigma, rel=0.02)
+    assert read.mean() == pytest.approx(z, abs=5.0 * sigma / math.sqrt(50000))
+    assert abs(np.corrcoef(read[:, 1:].ravel(), read[:, :-1].ravel())[0, 1]) < 0.02
+
+
+def test_the_noise_scale_is_a_factor():
+    depth = np.full((200, 250), 2.0, np.float32)
+    spread = [
+        DepthSensor(DepthConfig(axial_noise=scale, disparity_step=0.0), XTION_HFOV)
+        .corrupt(depth, np.random.default_rng(6))
+        .std()
+        for scale in (1.0, 3.0)
+    ]
+    assert spread[1] / spread[0] == pytest.approx(3.0, rel=1e-3)
+
+
+def test_quantisation_steps_grow_with_the_square_of_the_depth():
+    """Disparity f b / z in eighths of a pixel: levels z^2 / (8 f b) apart (3 mm at 1 m, 2.6 cm at 3 m)."""
+    ramp = np.linspace(0.6, 7.9, 200001, dtype=np.float32)[None, :]
+    sensor = DepthSensor(DepthConfig(axial_noise=0.0, edge_band=0), XTION_HFOV)
+    read = sensor.corrupt(ramp, np.random.default_rng(7))[0].astype(float)
+    levels = np.unique(read)
+    middle = 0.5 * (levels[1:] + levels[:-1])
+    focal_baseline = 320.0 / math.tan(XTION_HFOV / 2.0) * 0.075
+    assert np.diff(levels) == pytest.approx(middle**2 / (8.0 * focal_baseline), rel=0.02)
+    assert np.interp(1.0, middle, np.diff(levels)) == pytest.approx(0.003, abs=0.0002)
+    assert np.interp(3.0, middle, np.diff(levels)) == pytest.approx(0.026, abs=0.0007)
+    step = ramp[0] ** 2 / (8.0 * focal_baseline)
+    assert (np.abs(read - ramp[0]) < 0.53 * step).all()
+    assert focal_baseline / levels * 8.0 == pytest.approx(np.round(focal_baseline / levels * 8.0), abs=1e-3)
+
+
+def test_depth_out_of_range_is_no_reading():
+    depth = np.array([[0.1, 0.49, 0.51, 7.99, 8.01, 30.0]], np.float32)
+    sensor = DepthSensor(DepthConfig(axial_noise=0.0, disparity_step=0.0, edge_band=0), XTION_HFOV)
+    read = sensor.corrupt(depth, np.random.default_rng(8))
+    assert (read > 0.0).tolist() == [[False, False, True, True, False, False]]
+    assert read[0, 2:4] == pytest.approx(depth[0, 2:4])
+
+
+@pytest.mark.parametrize("band", [1, 2])
+def test_depth_edges_are_holes_as_wide_as_stated(band):
+    depth = np.full((12, 20), 3.0, np.float32)
+    depth[:, :10] = 1.0
+    sensor = DepthSensor(DepthConfig(axial_noise=0.0, disparity_step=0.0, edge_band=band), XTION_HFOV)
+    holes = sensor.corrupt(depth, np.random.default_rng(9)) == 0.0
+    wanted = np.zeros_like(holes)
+    wanted[:, 10 - band : 10 + band] = True
+    assert (holes == wanted).all()
+
+
+def test_smaller_jumps_than_the_limit_are_no_edges():
+    holes = {}
+    for jump in (0.14, 0.16):
+        depth = np.full((12, 20), 1.0, np.float32)
+        depth[5:, :] -= jump
+        sensor = DepthSensor(DepthConfig(axial_noise=0.0, disparity_step=0.0), XTION_HFOV)
+        holes[jump] = int((sensor.corrupt(depth, np.random.default_rng(10)) == 0.0).sum())
+    assert holes == {0.14: 0, 0.16: 2 * 20}
+
+
+def test_an_exact_sensor_changes_nothing_and_a_noisy_one_follows_its_generator():
+    depth = np.random.default_rng(11).uniform(0.2, 9.0, (30, 40)).astype(np.float32)
+    assert (DepthSensor(EXACT, XTION_HFOV).corrupt(depth, np.random.default_rng(0)) == depth).all()
+    noisy = DepthSensor(DepthConfig(edge_band=0), XTION_HFOV)
+    one, two, other = (noisy.corrupt(depth, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    assert (one == two).all()
+    assert (one != other).any()
+    assert one.dtype == np.float32
+
+
+def test_meshes_are_closed_and_their_normals_point_outwards():
+    """Every edge belongs to two triangles, run through in opposite directions; degenerate caps do not count."""
+    for segment in body.segments():
+        points, normals, indices = segment.mesh()
+        assert np.sqrt((normals**2).sum(axis=1)) == pytest.approx(1.0)
+        outwards = points[:, :2] * np.array(1.0)
+        side = np.sqrt((outwards**2).sum(axis=1)) > 1e-3
+        assert (np.einsum("ij,ij->i", normals[side][:, :2], outwards[side]) > -1e-9).all(), segment.name
+        triangles = points[indices.reshape(-1, 3)]
+        volume = np.einsum("ij,ij->i", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])).sum() / 6.0
+        radii = np.array([w * d for _, w, d in segment.profile])
+        shares = np.array([share for share, _, _ in segment.profile]) * segment.length
+        wanted = math.pi * np.trapezoid(radii, shares)
+        assert volume == pytest.approx(wanted, rel=0.08), segment.name
+
+
+def test_a_standing_adult_is_175_cm_tall_with_both_feet_on_the_floor():
+    placed = vertices(gait.pose(0.0, 0.0, 0.0, 5.0, 0.0))
+    assert max(part[:, 2].max() for part in placed.values()) == pytest.approx(1.75, abs=0.03)
+    for foot in ("foot_left", "foot_right"):
+        assert placed[foot][:, 2].min() == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize("speed", [0.3, 0.6, 0.92])
+def test_the_lower_foot_is_on_the_floor_and_nothing_below_it(speed):
+    """The lowest point of every pose of the gait cycle, from the meshes."""
+    for phase in PHASES:
+        placed = vertices(gait.pose(0.0, 0.0, 0.0, float(phase) * gait.STRIDE, speed))
+        lowest = min(part[:, 2].min() for part in placed.values())
+        assert lowest == pytest.approx(0.0, abs=0.02), phase
+
+
+def test_the_visible_body_is_where_the_collision_body_is():
+    """The trunk stays inside the capsule (25 cm around the axis), limbs within a step of it, and the axis in between."""
+    for phase in PHASES:
+        placed = vertices(gait.pose(2.0, -1.0, 0.8, float(phase) * gait.STRIDE, 0.92))
+        away = {name: np.hypot(part[:, 0] - 2.0, part[:, 1] + 1.0).max() for name, part in placed.items()}
+        for name in ("trunk", "hips", "neck", "head", "hair"):
+            assert away[name] < PERSON_RADIUS, (phase, name)
+        assert max(away.values()) < 0.65, phase
+        centre = np.mean([placed[name].mean(axis=0) for name in ("trunk", "hips")], axis=0)
+        assert centre[:2] == pytest.approx((2.0, -1.0), abs=0.05)
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0, math.pi / 2, -2.5])
+def test_the_person_faces_where_the_heading_points(heading):
+    """Toes before heels, knees bending forward, the left foot on the left."""
+    forward = np.array((math.cos(heading), math.sin(heading)))
+    leftward = np.array((-math.sin(heading), math.cos(heading)))
+    for phase in PHASES[::4]:
+        placed = vertices(gait.pose(1.0, 2.0, heading, float(phase) * gait.STRIDE, 0.92))
+        for side in ("left", "right"):
+            foot = placed[f"foot_{side}"]
+            heel, toe = foot[:14].mean(axis=0), foot[-14:].mean(axis=0)
+            assert (toe - heel)[:2] @ forward > 0.15, (phase, side)
+            shin, thigh = placed[f"shin_{side}"], placed[f"thigh_{side}"]
+            hip, knee, ankle = (part.mean(axis=0)[:2] @ forward for part in (thigh[:14], shin[:14], shin[-14:]))
+            assert knee > 0.5 * (hip + ankle) - 0.01, (phase, side)
+        apart = placed["foot_left"].mean(axis=0) - placed["foot_right"].mean(axis=0)
+        assert apart[:2] @ leftward == pytest.approx(2.0 * body.HIP_WIDTH, abs=0.01)
+
+
+def test_legs_alternate_and_arms_swing_against_them():
+    ahead = {name: [] for name in ("foot_left", "foot_right", "hand_left", "hand_right")}
+    for phase in PHASES:
+        placed = vertices(gait.pose(0.0, 0.0, 0.0, float(phase) * gait.STRIDE, 0.92))
+        for name, track in ahead.items():
+            track.append(placed[name][:, 0].mean())
+    tracks = {name: np.array(track) for name, track in ahead.items()}
+    half = len(PHASES) // 2
+    assert np.roll(tracks["foot_left"], half) == pytest.approx(tracks["foot_right"], abs=1e-9)
+    difference = tracks["foot_left"] - tracks["foot_right"]
+    assert np.count_nonzero(np.diff(np.sign(difference))) in (1, 2)
+    assert np.ptp(difference) > 1.0
+    for side in ("left", "right"):
+        assert np.corrcoef(tracks[f"foot_{side}"], tracks[f"hand_{side}"])[0, 1] < -0.7
+
+
+def test_the_raised_foot_moves_forward_and_the_standing_foot_stays_behind():
+    """Seen from the pelvis; the other way round would be walking backwards."""
+    tracks = {"foot_left": [], "foot_right": []}
+    for phase in (*PHASES, 1.0):
+        placed = vertices(gait.pose(0.0, 0.0, 0.0, float(phase) * gait.STRIDE, 0.92))
+        for name, track in tracks.items():
+            track.append((placed[name][:, 0].mean(), placed[name][:, 2].mean()))
+    moved = {name: np.diff(np.array(track), axis=0) for name, track in tracks.items()}
+    left, right = (np.array(tracks[name])[:-1, 1] for name in ("foot_left", "foot_right"))
+    clearly = np.abs(left - right) > 0.03
+    assert clearly.sum() > 10
+    raised = np.where(left > right, moved["foot_left"][:, 0], moved["foot_right"][:, 0])[clearly]
+    standing = np.where(left > right, moved["foot_right"][:, 0], moved["foot_left"][:, 0])[clearly]
+    assert (raised > standing).mean() > 0.9
+    assert standing.mean() < 0.0
+
+
+def test_the_gait_is_a_smooth_function_of_the_distance_walked():
+    """One stride later everything is where it was, a stride ahead; in 5 mm of walking nothing moves by 5 cm."""
+    for phase in PHASES[::6]:
+        walked = float(phase) * gait.STRIDE
+        now, later = vertices(gait.pose(0.0, 0.0, 0.0, walked, 0.9)), gait.pose(0.0, 0.0, 0.0, walked + gait.STRIDE, 0.9)
+        for name, part in vertices(later).items():
+            assert part == pytest.approx(now[name], abs=1e-9)
+    track = [vertices(gait.pose(0.0, 0.0, 0.0, 0.005 * step, 0.9)) for step in range(273)]
+    for before, after in zip(track, track[1:], strict=False):
+        for name in before:
+            assert np.abs(after[name] - before[name]).max() < 0.05, name

@@ -66,8 +66,9 @@ def watch(cell: Cell, seed: int, video: Path, camera: tuple[int, int] = CAMERA) 
     if not cv2.imwrite(str(sheet), _contact_sheet(pictures)[:, :, ::-1]):
         raise ValueError(f"the contact sheet {sheet} cannot be written; check the folder's permissions")
     reason = "collision" if info["collision"] else "person lost" if terminated else "the route's end"
+    success = "yes" if info["is_success"] else "no"
     return (
-        f"{len(pictures)} frames, {info['time']:.1f} s, ended by {reason}, success {'yes' if info['is_success'] else 'no'}\n"
+        f"{len(pictures)} frames, {info['time']:.1f} s, ended by {reason}, success {success}\n"
         f"{video} ({video.stat().st_size / 1e6:.1f} MB) and {sheet}"
     )
 

@@ -60,7 +60,8 @@ class FollowEnv(gymnasium.Env):
         obs: see above.
         action: `"twist"` or `"wheels"`.
         route: `"paper"` (12 m in 14 s, turns up to 50 deg), `"straight"` or `"standing"`.
-        sensor: `"xtion"`, `"ideal"` or a mapping of `SensorConfig` settings, e.g. `{"measurement": {"miss_share": .1}}`.
+        sensor: `"xtion"`, `"ideal"` or a mapping of `SensorConfig` settings, for example
+            `{"measurement": {"miss_share": 0.1}}`.
         camera: mapping of `CameraConfig` settings, e.g. `{"width": 320, "height": 240}`.
         robot: mapping of `RobotConfig` settings.
         renderer: `"tiny"` (PyBullet's software renderer).
@@ -73,7 +74,7 @@ class FollowEnv(gymnasium.Env):
         ValueError: for an unknown name or an impossible value, in one sentence.
     """
 
-    metadata = {"render_modes": ["rgb_array", "rgbd_tuple", "human"], "render_fps": 30}
+    metadata = {"render_modes": ["rgb_array", "rgbd_tuple", "human"], "render_fps": 30}  # noqa: RUF012
 
     def __init__(
         self,
@@ -124,6 +125,7 @@ class FollowEnv(gymnasium.Env):
         self.observation_space = self._make_observation_space()
         self._route: Route | None = None
         self.observed: RGBDFrame | None = None
+        self._dressed = self._person
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode.
@@ -153,7 +155,7 @@ class FollowEnv(gymnasium.Env):
 
         self._steps = 0
         self._twist = (0.0, 0.0)
-        self._last_action = np.zeros(2, np.float32)
+        self._last_action: np.ndarray = np.zeros(2, np.float32)
         self._out_of_view = self._longest_out_of_view = 0
         self._in_band = 0
         self._last_measured: float | None = None
@@ -216,7 +218,8 @@ class FollowEnv(gymnasium.Env):
 
     def frame(self) -> RGBDFrame:
         """Return the camera's picture of this moment without sensor errors: the truth, for pictures and tests."""
-        assert self._route is not None and self._world is not None
+        assert self._route is not None
+        assert self._world is not None
         if self._renderer is None:
             self._renderer = make_renderer(self._renderer_name, self.scene, self.camera, self._dressed)
         x, y, heading = self._route.pose(self.time)
@@ -282,7 +285,8 @@ class FollowEnv(gymnasium.Env):
 
     def _look(self) -> None:
         """Update the truth: poses, bearing, distance, visibility and what is counted from them."""
-        assert self._route is not None and self._world is not None
+        assert self._route is not None
+        assert self._world is not None
         t = self.time
         self._robot_pose = self._world.robot_pose()
         self._person_pose = self._route.pose(t)
@@ -385,6 +389,7 @@ class FollowEnv(gymnasium.Env):
             "is_success": success,
         }
         if self._obs == "rgbd_uint8":
+            assert self.observed is not None
             info["depth"] = self.observed.depth
         return info
 
@@ -394,7 +399,6 @@ class FollowEnv(gymnasium.Env):
             return
         if self._dashboard is None:
             self._dashboard = Dashboard(self.scene, self.camera, self.robot_config.camera_forward)
-        frame = self.observed if self._obs.startswith("rgbd") else self.frame()
-        self._dashboard.update(info, frame)
+        self._dashboard.update(info, self.observed or self.frame())
         if self.render_mode == "human":
             show_window(self._dashboard.image(), 1.0 / self.dt)

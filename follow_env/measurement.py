@@ -1,8 +1,9 @@
 """What a tracker would report, without rendering: the `emulated` rung of the benchmark.
 
-Regular errors are first-order Gauss-Markov processes around a bias; outliers of the distance come in runs: at
-renewals (geometric times) the state is drawn anew, an outlier with probability `outlier_share`, its size once a run. Every step draws the same count of random numbers, whatever
-happens in the world, so that two controllers with one seed meet the same errors.
+Regular errors are first-order Gauss-Markov processes around a bias. Outliers of the distance come in runs: at renewals
+(geometric times) the state is drawn anew, an outlier with probability `outlier_share`, its size once a run. Every step
+draws the same count of random numbers, whatever happens in the world, so that two controllers with one seed meet the
+same errors.
 """
 
 import math

@@ -176,12 +176,13 @@ class World:
         client = self._client
         boxes = [p for p in primitives if isinstance(p, Box)]
         cylinders = [p for p in primitives if isinstance(p, Cylinder)]
+        placed: list[Box | Cylinder] = [*boxes, *cylinders]
         shape = pybullet.createCollisionShapeArray(
             shapeTypes=[pybullet.GEOM_BOX] * len(boxes) + [pybullet.GEOM_CYLINDER] * len(cylinders),
             halfExtents=[[0.5 * s for s in box.size] for box in boxes] + [[0.0] * 3] * len(cylinders),
             radii=[0.0] * len(boxes) + [c.radius for c in cylinders],
             lengths=[0.0] * len(boxes) + [c.height for c in cylinders],
-            collisionFramePositions=[p.centre for p in (*boxes, *cylinders)],
+            collisionFramePositions=[p.centre for p in placed],
             collisionFrameOrientations=[(0.0, 0.0, math.sin(0.5 * b.yaw), math.cos(0.5 * b.yaw)) for b in boxes]
             + [(0.0, 0.0, 0.0, 1.0)] * len(cylinders),
             physicsClientId=client,

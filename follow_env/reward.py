@@ -8,7 +8,8 @@ def reward_terms(bearing: float, distance: float, visible: bool, effort: float, 
     """Return the terms of one step, each in its stated range.
 
     Args:
-        bearing, distance: truth, rad and m.
+        bearing: truth, rad.
+        distance: truth, m.
         visible: whether the person is in view.
         effort: largest change of an action component since the last step, in [0, 2].
         collided: whether the robot touches a wall or the person.

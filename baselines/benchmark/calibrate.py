@@ -12,6 +12,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import math
 import statistics
@@ -235,7 +236,7 @@ def _unmodelled_motion(scene: str, seed: int) -> tuple[float, float, float, floa
         )
         ended = terminated or truncated
     env.close()
-    steps = list(zip(rates, rates[1:], strict=False))
+    steps = list(itertools.pairwise(rates))
     largest_rates = [max(abs(rate[axis]) for rate in rates) for axis in (0, 1)]
     largest_accelerations = [max(abs(b[axis] - a[axis]) / DT for a, b in steps) for axis in (0, 1)]
     return largest_rates[0], largest_rates[1], largest_accelerations[0], largest_accelerations[1]

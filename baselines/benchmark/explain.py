@@ -6,8 +6,8 @@ from baselines.benchmark.cells import Cell
 from baselines.benchmark.statistics import Difference, PooledError, weighted_share
 from baselines.benchmark.table1 import PAPER_RMSE, UNITS, Table1, paper_ratio
 
-RATIO_TOLERANCE = 0.15
-"""A ratio agrees with the paper's when it lies within this share of it."""
+TOLERANCE = 0.15
+"""A number agrees with the paper's when it lies within this share of it."""
 NAMES = {"none": "No filter", "kf": "KF", "akf": "AKF", "akf_cv": "augmented AKF"}
 HYPOTHESES = (("kf", "none"), ("akf", "kf"))
 """(smaller, larger) RMSE, as the paper has them."""
@@ -25,16 +25,16 @@ def number(value: float, quantity: str, more: int = 0) -> str:
     return f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
-def within(ratio: float | None, paper: float | None) -> bool | None:
-    """Whether a ratio agrees with the paper's; None when there is nothing to compare."""
-    return None if ratio is None or paper is None else abs(ratio / paper - 1.0) <= RATIO_TOLERANCE
+def within(value: float | None, paper: float | None) -> bool | None:
+    """Whether a ratio or an RMSE agrees with the paper's; None when there is nothing to compare."""
+    return None if value is None or paper is None else abs(value / paper - 1.0) <= TOLERANCE
 
 
 def explain(table: Table1, perception: str, scene: str, quantity: str) -> str | None:
     """What differs from the paper for one scene and quantity, and what in the numbers explains it.
 
     Returns:
-        One paragraph, or None when both orders hold and both ratios agree.
+        One paragraph, or None when both orders hold and both ratios and No filter's RMSE agree.
     """
     verdicts = _verdicts(table, perception, scene, quantity)
     if not verdicts:
@@ -42,7 +42,7 @@ def explain(table: Table1, perception: str, scene: str, quantity: str) -> str | 
     none = table.error(perception, scene, "none", quantity)
     sentences = [f"{'; '.join(verdicts)}."]
     if not none.negligible:
-        sentences += [_scale(none, scene, quantity), _bias_share(none, quantity)]
+        sentences.append(_bias_share(none, quantity))
     else:
         sentences.append("No filter makes no error on perfect measurements, so a filter can only add its own.")
     kf, akf = (table.error(perception, scene, estimator, quantity) for estimator in ("kf", "akf"))
@@ -60,6 +60,10 @@ def explain(table: Table1, perception: str, scene: str, quantity: str) -> str | 
 
 def _verdicts(table: Table1, perception: str, scene: str, quantity: str) -> list[str]:
     verdicts = []
+    here, there = table.error(perception, scene, "none", quantity).rmse, PAPER_RMSE[scene, quantity, "none"]
+    if not within(here, there):
+        rmse = f"{number(here, quantity)} {UNITS[quantity]}"
+        verdicts.append(f"No filter errs by {rmse} (paper {number(there, quantity)})")
     for smaller, larger in HYPOTHESES:
         holds = table.difference(perception, scene, quantity, smaller, larger).negative
         if not holds:
@@ -70,14 +74,6 @@ def _verdicts(table: Table1, perception: str, scene: str, quantity: str) -> list
         if within(ratio, paper) is False:
             verdicts.append(f"the {NAMES[estimator]} ratio is {ratio:.2f} (paper {paper:.2f})")
     return verdicts
-
-
-def _scale(none: PooledError, scene: str, quantity: str) -> str:
-    paper = PAPER_RMSE[scene, quantity, "none"]
-    if abs(none.rmse / paper - 1.0) <= RATIO_TOLERANCE:
-        return ""
-    unit = UNITS[quantity]
-    return f"No filter errs by {number(none.rmse, quantity)} {unit} here and by {number(paper, quantity)} {unit} there."
 
 
 def _bias_share(none: PooledError, quantity: str) -> str:
@@ -120,7 +116,7 @@ def _correlation(table: Table1, perception: str, scene: str, quantity: str) -> s
     """Whether the errors are ones that averaging could remove, where the KF removes less than the paper's."""
     ratio, paper = table.ratio(perception, scene, quantity, "kf"), paper_ratio(scene, quantity, "kf")
     correlation = weighted_share(table.cell(perception, scene, "none"), f"{quantity}_error_correlation")
-    if ratio is None or paper is None or correlation is None or ratio <= paper * (1.0 + RATIO_TOLERANCE):
+    if ratio is None or paper is None or correlation is None or ratio <= paper * (1.0 + TOLERANCE):
         return ""
     text = f"Successive errors of No filter correlate by {correlation:.2f}"
     if correlation >= _SLOW_ERRORS:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from baselines.benchmark.cells import ESTIMATORS, SCENES
-from baselines.benchmark.explain import HYPOTHESES, NAMES, RATIO_TOLERANCE, explain, number, within
+from baselines.benchmark.explain import HYPOTHESES, NAMES, TOLERANCE, explain, number, within
 from baselines.benchmark.statistics import Difference, weighted_share
 from baselines.benchmark.table1 import PAPER_RMSE, QUANTITIES, UNITS, Table1, paper_ratio
 
@@ -34,7 +34,7 @@ def report(table: Table1) -> str:
             _errors(table, perception),
             "### Hypotheses\n\nThe paper has AKF < KF < No filter everywhere.",
             _hypotheses(table, perception),
-            f"### Ratios to No filter\n\nBeside the paper's, within {RATIO_TOLERANCE:.0%} of them or not.",
+            f"### Ratios to No filter\n\nBeside the paper's, within {TOLERANCE:.0%} of them or not.",
             _ratios(table, perception),
             "### What differs, and why",
             _explanations(table, perception),
@@ -113,7 +113,7 @@ def _hypotheses(table: Table1, perception: str) -> str:
 def _ratios(table: Table1, perception: str) -> str:
     header = ["scene", "quantity"]
     for name in ("KF", "AKF"):
-        header += [f"{name} ratio", "paper", f"within {RATIO_TOLERANCE:.0%}"]
+        header += [f"{name} ratio", "paper", f"within {TOLERANCE:.0%}"]
     rows = []
     for scene in SCENES:
         for quantity in QUANTITIES:

@@ -43,7 +43,9 @@ def pose(x: float, y: float, heading: float, walked: float, speed: float) -> lis
     """Return (position m, quaternion xyzw) of every segment in the world frame, in the order of `body.segments`.
 
     Args:
-        x, y, heading: the pelvis axis, m and rad.
+        x: of the pelvis axis, m.
+        y: of the pelvis axis, m.
+        heading: walking direction, rad.
         walked: distance walked so far, m (the gait's phase).
         speed: walking speed, m/s (the gait's amplitude).
     """

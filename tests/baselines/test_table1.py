@@ -1,17 +1,17 @@
 """A whole reproduction: the same files however it is run or killed, and a table that says what the episodes say."""
 
 import csv
-import functools
 import hashlib
 import importlib
 import json
 import os
-import random
 import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -39,7 +39,7 @@ REPRODUCIBLE = {
 
 
 @pytest.fixture(scope="module")
-def synthetic() -> ModuleType:
+def synthetic() -> Iterator[ModuleType]:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(HERE)
         yield importlib.import_module("synthetic")
@@ -98,35 +98,26 @@ def test_two_processes_write_the_same_bytes_as_one(synthetic: ModuleType, finish
 
 
 def test_a_run_killed_again_and_again_ends_with_the_same_bytes(finished: Path, tmp_path: Path) -> None:
+    """Killed while it plays, with one and two processes, and twice while it writes the results."""
     out = tmp_path / "killed"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(HERE)])}
-    generator = random.Random(1)
-    tasks = 2 * (4 * 4 + (5 + 15 - 2) * 2 + 2 * 3 * 2)
     kept = []
-    for attempt in range(60):
-        command = [sys.executable, "-m", "synthetic", str(out), "4", str(1 + attempt % 2), "0.02"]
-        with subprocess.Popen(
-            command if attempt == 0 else [*command, "resume"], env=environment, stderr=subprocess.DEVNULL
-        ) as process:
-            deadline = time.monotonic() + generator.uniform(1.0, 2.5)
-            while process.poll() is None and time.monotonic() < deadline:
-                time.sleep(0.01)
-            process.send_signal(signal.SIGKILL)
-        if (out / FILE_NAME).exists():
-            with Store(out, digest_of_the_store(out)) as store:
-                kept.append(len(store))
-        if process.returncode == 0:
-            break
+    for jobs, line, delay in ((1, 3, 0.03), (2, 3, 0.05), (1, 2, 0.01), (2, 99, 0.15), (1, 0, 0.6), (2, 99, None)):
+        command = [sys.executable, "-m", "synthetic", str(out), "4", str(jobs), "0.0", *(["resume"] if kept else [])]
+        with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as process:
+            assert process.stderr is not None
+            for number, text in enumerate(process.stderr):
+                done, _, tasks, _ = text.split()
+                if number == line or done == tasks:
+                    break
+            if delay is not None:
+                time.sleep(delay)
+                process.send_signal(signal.SIGKILL)
+        with Store(out, json.loads((out / "config.json").read_text(encoding="utf-8"))["settings_sha256"]) as store:
+            kept.append(len(store))
     assert process.returncode == 0
-    assert kept == sorted(kept)
-    assert 3 <= len([count for count in kept if 0 < count < tasks])
-    assert kept[-1] == tasks
+    assert 0 < kept[0] < kept[1] < kept[2] < kept[3] == kept[4] == kept[5] == int(tasks)
     assert files(out) == files(finished)
-    assert not list(out.glob(".*"))
-
-
-def digest_of_the_store(out: Path) -> str:
-    return json.loads((out / "config.json").read_text(encoding="utf-8"))["settings_sha256"]
 
 
 def test_resuming_takes_exactly_the_seeds_that_are_asked_for(
@@ -195,6 +186,30 @@ def test_a_file_in_the_folders_place_is_refused(synthetic: ModuleType, tmp_path:
         with pytest.raises(InputError, match=r"cannot be written .*--out\.$"):
             run(synthetic, out)
     assert (tmp_path / "taken").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.fixture
+def read_only() -> Iterator[Path]:
+    """A folder that this process may read but not write, without the rights of root if it has them."""
+    root = os.geteuid() == 0
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o555)
+        if root:
+            os.seteuid(65534)
+        try:
+            yield folder
+        finally:
+            if root:
+                os.seteuid(0)
+            folder.chmod(0o755)
+
+
+@pytest.mark.parametrize("name", ["", "below"])
+def test_a_read_only_folder_is_refused_before_any_work(synthetic: ModuleType, read_only: Path, name: str) -> None:
+    with pytest.raises(InputError, match=r"cannot be (used|written) \(.*\): make .*--out\.$"):
+        run(synthetic, read_only / name, episode=None)
+    assert list(read_only.iterdir()) == []
 
 
 def test_an_interrupted_run_says_what_it_kept(synthetic: ModuleType, finished: Path, tmp_path: Path) -> None:
@@ -348,7 +363,8 @@ def test_a_curve_stops_where_fewer_than_half_of_the_episodes_are_left() -> None:
 def made(bias: dict[str, float], spread: dict[str, float], **columns: float) -> Table1:
     """A table whose distances have the given bias and spread, m, by estimator, and whose angles follow the paper."""
     generator = np.random.default_rng(0)
-    factors = generator.uniform(0.95, 1.05, 40)
+    factors = generator.uniform(0.995, 1.005, 40)
+    factors /= np.mean(factors)
     rows: dict[Cell, list[Row]] = {}
     for scene in ("corridor", "indoor"):
         for estimator in ("none", "kf", "akf", "akf_cv"):
@@ -379,10 +395,10 @@ def test_a_cell_as_in_the_paper_needs_no_explanation() -> None:
         dict.fromkeys(("none", "kf", "akf", "akf_cv"), 0.0), {"none": 0.1, "kf": 0.083, "akf": 0.078, "akf_cv": 0.07}
     )
     assert explain(table, "emulated", "corridor", "angle") is None
-    assert explain(table, "emulated", "corridor", "distance") is not None  # 10 cm is not the paper's 15 cm ...
+    assert "No filter errs by 10.00 cm (paper 15.32)." in str(explain(table, "emulated", "corridor", "distance"))
     text = report(table)
     line = next(line for line in text.splitlines() if line.startswith("| corridor | distance |"))
-    assert line.split() == "| corridor | distance | 0.83 | 0.83 | yes | 0.78 | 0.78 | yes |".split()
+    assert line.split() == [*"|corridor|distance|0.83|0.83|yes|0.78|0.78|yes|".replace("|", " | ").strip().split(" ")]
 
 
 def test_bias_that_dominates_is_named_with_its_share_and_the_lag() -> None:
@@ -393,10 +409,8 @@ def test_bias_that_dominates_is_named_with_its_share_and_the_lag() -> None:
     assert "KF < No filter does not hold; AKF < KF does not hold; the KF ratio is 1.49 (paper 0.83)" in text
     assert "Bias (-11.20 cm) makes 83% of No filter's squared error" in text
     assert "without any spread the ratio would still be 0.91" in text
-    assert (
-        "The KF takes bias from -11.20 to -18.00 cm and spread from 5.00 to 3.00 cm: more bias added than spread removed."
-        in text
-    )
+    effect = "The KF takes bias from -11.20 to -18.00 cm and spread from 5.00 to 3.00 cm"
+    assert f"{effect}: more bias added than spread removed." in text
     assert "The AKF finds no outlier in any episode and does what the KF does." in text
     assert "Successive errors of No filter correlate by 0.90: they change too slowly" in text
     assert "carry 5% of its squared error, which leaves the AKF little to reject" in text
@@ -446,49 +460,33 @@ def test_a_markdown_table_is_aligned() -> None:
     ]
 
 
-@pytest.mark.slow
+FEATURES = ("", "AVX512F AVX512_SKX AVX2 FMA3")
+"""What NumPy may not use of the processor: nothing, and what changes the last bits of its functions."""
+
+
 def test_real_results_do_not_depend_on_processes_or_on_the_cpus_features(tmp_path: Path) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "baselines.cli",
-        "reproduce",
-        "table1",
-        "--perception",
-        "emulated",
-        "--episodes",
-        "1",
-    ]
-    for name, jobs, features in (("one", "1", ""), ("two", "2", "AVX512F AVX512_SKX AVX2 FMA3")):
+    command = [sys.executable, "-m", "baselines.cli", "reproduce", "table1", "--perception", "truth", "--episodes", "2"]
+    for name, jobs, features in zip(("one", "two"), ("1", "2"), FEATURES, strict=True):
         environment = {**os.environ, "PYTHONPATH": str(ROOT), "NPY_DISABLE_CPU_FEATURES": features}
         subprocess.run(
             [*command, "--jobs", jobs, "--out", str(tmp_path / name)], env=environment, check=True, capture_output=True
         )
     assert files(tmp_path / "one") == files(tmp_path / "two")
-    assert len(files(tmp_path / "one")) == len(REPRODUCIBLE)
+    assert len(files(tmp_path / "one")) == 4
 
 
-@pytest.mark.slow
-def test_the_pictures_that_are_rendered_do_not_depend_on_the_cpus_features(tmp_path: Path) -> None:
+@pytest.mark.parametrize("perception", ["emulated", "mask"])
+def test_real_episodes_do_not_depend_on_the_cpus_features(perception: str) -> None:
     script = (
         "from baselines.benchmark.cells import Cell\n"
         "from baselines.benchmark.episodes import Player\n"
-        "episode = Player()(Cell('mask', 'indoor', 'akf'), 0)\n"
-        "print(sorted(episode.row.items(), key=str), episode.curve.tobytes().hex()[-500:])\n"
+        f"episode = Player()(Cell({perception!r}, 'indoor', 'akf'), 0)\n"
+        "print(episode.row, episode.curve.tobytes().hex())\n"
     )
-    outputs = {
-        subprocess.run(
-            [sys.executable, "-c", script],
-            env={**os.environ, "PYTHONPATH": str(ROOT), "NPY_DISABLE_CPU_FEATURES": features},
-            check=True,
-            capture_output=True,
-            text=True,
-        ).stdout
-        for features in ("", "AVX512F AVX512_SKX AVX2 FMA3")
-    }
-    assert len(outputs) == 1
-
-
-def test_a_partial_function_is_an_episode_function(synthetic: ModuleType) -> None:
-    shorter = functools.partial(synthetic.episode, seconds=1.0)
-    assert shorter(Cell("emulated", "indoor", "kf"), 0).row["steps"] == 31
+    outputs = []
+    for features in FEATURES:
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "NPY_DISABLE_CPU_FEATURES": features}
+        played = subprocess.run([sys.executable, "-c", script], env=environment, check=True, capture_output=True)
+        outputs.append(played.stdout)
+    assert b"distance_rmse_m" in outputs[0]
+    assert outputs[0] == outputs[1]

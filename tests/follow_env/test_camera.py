@@ -1,5 +1,6 @@
 """Camera, depth sensor and the person that is seen: pictures against geometry computed here."""
 
+import itertools
 import math
 
 import gymnasium
@@ -33,8 +34,8 @@ def scene(*boxes):
     return Scene("test", boxes, GREY, LAMP, 0.5, (-20.0, 20.0, -20.0, 20.0))
 
 
-def picture(camera, pose, boxes, person=None):
-    renderer = make_renderer("tiny", scene(*boxes), camera, "blue")
+def picture(camera, pose, boxes, person=None, clothes="blue"):
+    renderer = make_renderer("tiny", scene(*boxes), camera, clothes)
     frame = renderer.render(pose, NOBODY if person is None else person)
     renderer.close()
     return frame
@@ -58,9 +59,10 @@ def plate(pose, ahead, left, up, size=0.3):
     [(2.0, 0.0, 0.0), (2.5, 0.8, 0.5), (2.5, -0.8, -0.3), (4.0, 1.2, -0.6), (6.0, -2.0, 1.2)],
 )
 def test_a_point_appears_where_the_intrinsics_say(pose, ahead, left, up):
-    """The centroid of a plate's pixels is the projection of its centre, to a tenth of a pixel and 5 mm of depth.
+    """The centroid of a plate's pixels is the projection of its centre: within half a pixel, and 5 mm of depth.
 
-    A plate that faces the camera is imaged without distortion, so its centroid is the image of its centre.
+    A plate that faces the camera is imaged without distortion, so its centroid is the image of its centre; a rectangle
+    covers whole rows and columns, which leaves half a pixel on each axis. The next test averages that away.
     """
     empty = picture(CAMERA, pose, ())
     frame = picture(CAMERA, pose, (plate(pose, ahead, left, up),))
@@ -68,23 +70,33 @@ def test_a_point_appears_where_the_intrinsics_say(pose, ahead, left, up):
     assert len(rows) > 30
     u, v, z = CAMERA.project(pose, world_point(pose, ahead, left, up))
     assert z == pytest.approx(ahead)
-    assert (columns + 0.5).mean() == pytest.approx(u, abs=0.1 + 0.5 / math.sqrt(len(rows)))
-    assert (rows + 0.5).mean() == pytest.approx(v, abs=0.1 + 0.5 / math.sqrt(len(rows)))
+    assert (columns + 0.5).mean() == pytest.approx(u, abs=0.52)
+    assert (rows + 0.5).mean() == pytest.approx(v, abs=0.52)
     assert frame.depth[rows, columns] == pytest.approx(ahead, abs=0.005)
 
 
 def test_the_picture_is_not_shifted_on_average():
-    """Over 60 random plates the mean difference of centroid and projection is below 0.05 px: no half-pixel shift."""
+    """Over 144 plates the mean difference of centroid and projection is below 0.08 px: no half-pixel shift.
+
+    Twelve plates a picture, one in each cell of 40 x 40 px; the rounding of their edges is 0.29 px rms on each axis.
+    """
     rng, differences = np.random.default_rng(0), []
-    for _ in range(60):
+    for _ in range(12):
         pose = CameraPose(*rng.uniform(-3.0, 3.0, 2).tolist(), 1.0, float(rng.uniform(-3.0, 3.0)))
-        ahead = float(rng.uniform(1.5, 4.0))
-        left, up = (float(share) * ahead for share in rng.uniform((-0.4, -0.2), (0.4, 0.25)))
-        empty, frame = picture(SMALL, pose, ()), picture(SMALL, pose, (plate(pose, ahead, left, up),))
-        rows, columns = np.nonzero(frame.depth < empty.depth - 0.05)
-        u, v, _ = SMALL.project(pose, world_point(pose, ahead, left, up))
-        differences.append(((columns + 0.5).mean() - u, (rows + 0.5).mean() - v))
-    assert np.abs(np.mean(differences, axis=0)).max() < 0.05
+        places = []
+        for row, column in np.ndindex(3, 4):
+            ahead = float(rng.uniform(1.5, 2.5))
+            u, v = (40.0 * cell + 20.0 + float(rng.uniform(-6.0, 6.0)) for cell in (column, row))
+            places.append((ahead, (CAMERA.cx - u) * ahead / CAMERA.focal, (CAMERA.cy - v) * ahead / CAMERA.focal))
+        empty = picture(CAMERA, pose, ())
+        frame = picture(CAMERA, pose, tuple(plate(pose, *place, size=0.15) for place in places))
+        nearer = frame.depth < empty.depth - 0.05
+        for (row, column), place in zip(np.ndindex(3, 4), places, strict=True):
+            rows, columns = np.nonzero(nearer[40 * row : 40 * row + 40, 40 * column : 40 * column + 40])
+            u, v, _ = CAMERA.project(pose, world_point(pose, *place))
+            differences.append((40 * column + (columns + 0.5).mean() - u, 40 * row + (rows + 0.5).mean() - v))
+    assert np.abs(np.mean(differences, axis=0)).max() < 0.08
+    assert np.sqrt(np.mean(np.square(differences), axis=0)).max() < 0.33
 
 
 def test_left_is_left_and_up_is_up():
@@ -170,10 +182,8 @@ def test_the_persons_pixels_fill_the_projection_of_the_body(pose, ahead, left):
 def test_the_persons_pixels_have_the_persons_depth_and_colour():
     pose = POSES["origin"]
     x, y, _ = world_point(pose, 2.0, 0.0, 0.0)
-    frames = {
-        clothes: make_renderer("tiny", scene(), CAMERA, clothes).render(pose, gait.pose(x, y, 0.0, 0.0, 0.0))
-        for clothes in body.CLOTHES
-    }
+    person = gait.pose(x, y, 0.0, 0.0, 0.0)
+    frames = {clothes: picture(CAMERA, pose, (), person, clothes) for clothes in body.CLOTHES}
     for frame in frames.values():
         depth = frame.depth[frame.ids == 1]
         assert depth.min() > 2.0 - 0.30
@@ -342,14 +352,13 @@ def test_an_exact_sensor_changes_nothing_and_a_noisy_one_follows_its_generator()
     assert one.dtype == np.float32
 
 
-def test_meshes_are_closed_and_their_normals_point_outwards():
-    """Every edge belongs to two triangles, run through in opposite directions; degenerate caps do not count."""
+def test_meshes_enclose_their_profile_and_their_normals_point_outwards():
+    """The signed volume is that of the stacked ellipses, which a hole or a face turned inside out would change."""
     for segment in body.segments():
         points, normals, indices = segment.mesh()
         assert np.sqrt((normals**2).sum(axis=1)) == pytest.approx(1.0)
-        outwards = points[:, :2] * np.array(1.0)
-        side = np.sqrt((outwards**2).sum(axis=1)) > 1e-3
-        assert (np.einsum("ij,ij->i", normals[side][:, :2], outwards[side]) > -1e-9).all(), segment.name
+        side = np.sqrt((points[:, :2] ** 2).sum(axis=1)) > 1e-3
+        assert (np.einsum("ij,ij->i", normals[side][:, :2], points[side][:, :2]) > -1e-9).all(), segment.name
         triangles = points[indices.reshape(-1, 3)]
         volume = np.einsum("ij,ij->i", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])).sum() / 6.0
         radii = np.array([w * d for _, w, d in segment.profile])
@@ -375,7 +384,7 @@ def test_the_lower_foot_is_on_the_floor_and_nothing_below_it(speed):
 
 
 def test_the_visible_body_is_where_the_collision_body_is():
-    """The trunk stays inside the capsule (25 cm around the axis), limbs within a step of it, and the axis in between."""
+    """The trunk stays inside the capsule (25 cm around the axis), the limbs within a step of it."""
     for phase in PHASES:
         placed = vertices(gait.pose(2.0, -1.0, 0.8, float(phase) * gait.STRIDE, 0.92))
         away = {name: np.hypot(part[:, 0] - 2.0, part[:, 1] + 1.0).max() for name, part in placed.items()}
@@ -420,31 +429,38 @@ def test_legs_alternate_and_arms_swing_against_them():
         assert np.corrcoef(tracks[f"foot_{side}"], tracks[f"hand_{side}"])[0, 1] < -0.7
 
 
-def test_the_raised_foot_moves_forward_and_the_standing_foot_stays_behind():
-    """Seen from the pelvis; the other way round would be walking backwards."""
-    tracks = {"foot_left": [], "foot_right": []}
-    for phase in (*PHASES, 1.0):
-        placed = vertices(gait.pose(0.0, 0.0, 0.0, float(phase) * gait.STRIDE, 0.92))
-        for name, track in tracks.items():
-            track.append((placed[name][:, 0].mean(), placed[name][:, 2].mean()))
-    moved = {name: np.diff(np.array(track), axis=0) for name, track in tracks.items()}
-    left, right = (np.array(tracks[name])[:-1, 1] for name in ("foot_left", "foot_right"))
-    clearly = np.abs(left - right) > 0.03
+def feet(phase):
+    """World x of both feet's middles and z of their lowest points, walking along +x from the origin, (left, right)."""
+    placed = vertices(gait.pose(phase * gait.STRIDE, 0.0, 0.0, phase * gait.STRIDE, 0.92))
+    pair = [placed[name] for name in ("foot_left", "foot_right")]
+    return [part[:, 0].mean() for part in pair], [part[:, 2].min() for part in pair]
+
+
+def test_the_raised_foot_moves_forward_past_the_standing_one():
+    """The other way round would be walking backwards."""
+    ahead, height = (np.array(column) for column in zip(*(feet(float(phase)) for phase in (*PHASES, 1.0)), strict=True))
+    faster = np.diff(ahead[:, 0] - ahead[:, 1])
+    higher = (height[1:, 0] - height[1:, 1] + height[:-1, 0] - height[:-1, 1]) / 2.0
+    clearly = np.abs(higher) > 0.04
     assert clearly.sum() > 10
-    raised = np.where(left > right, moved["foot_left"][:, 0], moved["foot_right"][:, 0])[clearly]
-    standing = np.where(left > right, moved["foot_right"][:, 0], moved["foot_left"][:, 0])[clearly]
-    assert (raised > standing).mean() > 0.9
-    assert standing.mean() < 0.0
+    assert np.corrcoef(faster[clearly], higher[clearly])[0, 1] > 0.7
+
+
+def test_the_standing_foot_does_not_slide():
+    """Through mid-stance the person walks 44 cm; the left foot stays within 6 cm, flat on the floor."""
+    stance = [feet(float(phase)) for phase in np.linspace(0.10, 0.42, 33)]
+    assert np.ptp([ahead[0] for ahead, _ in stance]) < 0.06
+    assert np.abs([height[0] for _, height in stance]).max() < 0.01
 
 
 def test_the_gait_is_a_smooth_function_of_the_distance_walked():
     """One stride later everything is where it was, a stride ahead; in 5 mm of walking nothing moves by 5 cm."""
     for phase in PHASES[::6]:
         walked = float(phase) * gait.STRIDE
-        now, later = vertices(gait.pose(0.0, 0.0, 0.0, walked, 0.9)), gait.pose(0.0, 0.0, 0.0, walked + gait.STRIDE, 0.9)
-        for name, part in vertices(later).items():
+        now, later = (vertices(gait.pose(0.0, 0.0, 0.0, walked + more, 0.9)) for more in (0.0, gait.STRIDE))
+        for name, part in later.items():
             assert part == pytest.approx(now[name], abs=1e-9)
     track = [vertices(gait.pose(0.0, 0.0, 0.0, 0.005 * step, 0.9)) for step in range(273)]
-    for before, after in zip(track, track[1:], strict=False):
+    for before, after in itertools.pairwise(track):
         for name in before:
             assert np.abs(after[name] - before[name]).max() < 0.05, name

@@ -1,6 +1,7 @@
 """The walker's routes: paper B's rule, and a path that is the integral of its own velocity."""
 
 import functools
+import itertools
 import math
 
 import numpy as np
@@ -52,9 +53,9 @@ def test_every_paper_route_obeys_the_papers_rule(scene):
         for turn in route.turns:
             assert math.radians(20.0) <= abs(turn.angle) <= math.radians(50.0), (seed, turn)
             assert 0.8 <= turn.duration <= 1.6, (seed, turn)
-            assert 0.0 < turn.start, (seed, turn)
+            assert turn.start > 0.0, (seed, turn)
             assert turn.start + turn.duration < route.duration, (seed, turn)
-        for before, after in zip(route.turns, route.turns[1:], strict=False):
+        for before, after in itertools.pairwise(route.turns):
             assert before.start + before.duration <= after.start, (seed, "turns overlap")
 
 

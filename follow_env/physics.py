@@ -94,12 +94,16 @@ class World:
         dt = substeps / PHYSICS_HZ
         self._command = self.drive.limit(left, right, self._command, dt)
         self._drive_wheels()
-        step, client = pybullet.stepSimulation, self._client
-        for _ in range(substeps):
-            step(client)
+        self.simulate(substeps)
         before, self._angles = self._angles, self._wheel_angles()
         scale = self.config.wheel_radius / dt
         return self.drive.twist((self._angles[0] - before[0]) * scale, (self._angles[1] - before[1]) * scale)
+
+    def simulate(self, substeps: int) -> None:
+        """Advance by `substeps` bare physics steps with the wheel commands that stand."""
+        step, client = pybullet.stepSimulation, self._client
+        for _ in range(substeps):
+            step(client)
 
     @property
     def wheel_command(self) -> tuple[float, float]:

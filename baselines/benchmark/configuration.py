@@ -116,18 +116,28 @@ def document(plan: Plan, settings: Mapping[str, Any], folder: Path, jobs: int) -
             **{f"table1/{perception}": list(range(count)) for perception, count in plan.episodes.items()},
             "studies": list(plan.study_seeds),
         },
-        "packages": {name: _version(name) for name in _PACKAGES},
-        "machine": {
-            "platform": platform.platform(),
-            "python": platform.python_version(),
-            "cpu": _cpu_model(),
-            "cpu_count": os.cpu_count(),
-        },
+        "packages": packages(),
+        "machine": machine(),
         "jobs": jobs,
         "folder": folder.name,
         "started": datetime.now(timezone.utc).isoformat(timespec="seconds"),
     }
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+def packages() -> dict[str, str | None]:
+    """Installed versions of what results depend on."""
+    return {name: _version(name) for name in _PACKAGES}
+
+
+def machine() -> dict[str, str | int | None]:
+    """What this machine is."""
+    return {
+        "platform": platform.platform(),
+        "python": platform.python_version(),
+        "cpu": _cpu_model(),
+        "cpu_count": os.cpu_count(),
+    }
 
 
 def _version(package: str) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,7 +13,7 @@ from baselines.benchmark.files import Value
 from baselines.benchmark.table1 import QUANTITIES, UNITS
 
 CURVE_COLUMNS = (
-    *("perception", "scene", "quantity", "unit", "estimator", "time_s", "episodes"),
+    *("perception", "scene", "quantity", "unit", "estimator", "time_s", "running"),
     *("mean", "p10", "p90"),
 )
 RATE = 10
@@ -24,8 +25,8 @@ _SCALE = {"angle": 1.0, "distance": 100.0}
 def curve_records(curves: Mapping[Cell, Sequence[NDArray[np.float64]]]) -> list[dict[str, Value]]:
     """Mean and 10-90 % band over episodes of the cumulative absolute errors, rad and cm.
 
-    An episode that ended early counts as long as it lasted; a curve stops where fewer than half of its episodes are
-    left, because the rest says more about who is left than about the error.
+    An episode that ended early keeps its last sum, so that a curve never falls; the column ``running`` counts those
+    that have not ended.
 
     Args:
         curves: Curves of each cell's episodes, each of shape (steps, 3): time s, angle rad, distance m.
@@ -35,9 +36,7 @@ def curve_records(curves: Mapping[Cell, Sequence[NDArray[np.float64]]]) -> list[
         sampled = [_sample(curve) for curve in episodes]
         for column, quantity in enumerate(QUANTITIES):
             for index in range(max(len(points) for points in sampled)):
-                values = [float(points[index, column]) * _SCALE[quantity] for points in sampled if index < len(points)]
-                if 2 * len(values) < len(episodes):
-                    break
+                values = [float(points[min(index, len(points) - 1), column]) * _SCALE[quantity] for points in sampled]
                 low, high = np.quantile(values, [0.1, 0.9])
                 records.append(
                     {
@@ -47,8 +46,8 @@ def curve_records(curves: Mapping[Cell, Sequence[NDArray[np.float64]]]) -> list[
                         "unit": UNITS[quantity],
                         "estimator": cell.estimator,
                         "time_s": index / RATE,
-                        "episodes": len(values),
-                        "mean": sum(values) / len(values),
+                        "running": sum(index < len(points) for points in sampled),
+                        "mean": math.fsum(values) / len(values),
                         "p10": float(low),
                         "p90": float(high),
                     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from baselines.benchmark.cells import Cell
-from baselines.benchmark.statistics import Difference, PooledError, weighted_share
+from baselines.benchmark.statistics import NEGLIGIBLE, Difference, PooledError, weighted_share
 from baselines.benchmark.table1 import PAPER_RMSE, UNITS, Table1, paper_ratio
 
 TOLERANCE = 0.15
@@ -13,6 +13,7 @@ HYPOTHESES = (("kf", "none"), ("akf", "kf"))
 """(smaller, larger) RMSE, as the paper has them."""
 
 _FEW_OUTLIERS = 0.2
+_ONE_EPISODE_SHARE = 0.25
 _SLOW_ERRORS = 0.5
 _NO_DIFFERENCE = Difference(0.0, (0.0, 0.0))
 _NEGLIGIBLE_SHARE = 0.01
@@ -47,7 +48,7 @@ def explain(table: Table1, perception: str, scene: str, quantity: str) -> str | 
         sentences.append("No filter makes no error on perfect measurements, so a filter can only add its own.")
     kf, akf = (table.error(perception, scene, estimator, quantity) for estimator in ("kf", "akf"))
     sentences.append(_filter_effect(kf, none, "kf", quantity))
-    if not none.negligible:
+    if none.bias**2 < none.spread**2 and kf.spread < none.spread:
         sentences.append(_correlation(table, perception, scene, quantity))
     if akf.minus(kf) == _NO_DIFFERENCE:
         sentences.append("The AKF finds no outlier in any episode and does what the KF does.")
@@ -55,6 +56,7 @@ def explain(table: Table1, perception: str, scene: str, quantity: str) -> str | 
         sentences.append(_filter_effect(akf, none, "akf", quantity))
     if not none.negligible:
         sentences.append(_outliers(table, perception, scene, quantity))
+    sentences += [_one_episode(table, perception, scene, quantity, estimator) for estimator in ("none", "kf", "akf")]
     return " ".join(sentence for sentence in sentences if sentence)
 
 
@@ -98,7 +100,7 @@ def _filter_effect(error: PooledError, none: PooledError, estimator: str, quanti
     told = {
         name: f"{name} from {number(before, quantity)} to {number(after, quantity)} {unit}"
         for name, (before, after) in parts.items()
-        if abs(change[name]) > _NEGLIGIBLE_SHARE * none.rmse**2
+        if abs(change[name]) > _NEGLIGIBLE_SHARE * none.rmse**2 and max(abs(before), abs(after)) >= NEGLIGIBLE
     }
     if not told:
         return f"The {NAMES[estimator]} changes neither bias nor spread."
@@ -124,11 +126,27 @@ def _correlation(table: Table1, perception: str, scene: str, quantity: str) -> s
     return f"{text}, so averaging could remove more: the gain that the rule for Q gives leaves the rest."
 
 
+def _one_episode(table: Table1, perception: str, scene: str, quantity: str, estimator: str) -> str:
+    """Whether a single episode decides an estimator's error, and what happened in it."""
+    squares = table.error(perception, scene, estimator, quantity).squares.tolist()
+    share = max(squares) / sum(squares) if sum(squares) > 0.0 else 0.0
+    if share <= max(_ONE_EPISODE_SHARE, 3.0 / len(squares)):
+        return ""
+    row = table.cell(perception, scene, estimator)[squares.index(max(squares))]
+    owner = NAMES[estimator] if estimator == "none" else f"the {NAMES[estimator]}"
+    text = f"Seed {row['seed']} alone makes {share:.0%} of {owner}'s squared error"
+    if row["loss_count"]:
+        text += f"; there the person was out of view for up to {row['longest_out_of_view_s']:.1f} s"
+    if row["ended"] != "time":
+        text += f"; it ended early ({row['ended']})"
+    return f"{text}."
+
+
 def _outliers(table: Table1, perception: str, scene: str, quantity: str) -> str:
     none_rows = table.cell(perception, scene, "none")
     squares = table.error(perception, scene, "none", quantity).squares
     share = weighted_share(none_rows, f"{quantity}_outlier_share") or 0.0
-    carried = weighted_share(none_rows, f"{quantity}_outlier_square_share", dict(enumerate(squares.tolist()))) or 0.0
+    carried = weighted_share(none_rows, f"{quantity}_outlier_square_share", squares.tolist()) or 0.0
     inflated = weighted_share(table.cell(perception, scene, "akf"), f"{quantity}_inflated_share") or 0.0
     text = (
         f"Outliers (beyond three robust standard deviations) are {share:.1%} of No filter's errors "

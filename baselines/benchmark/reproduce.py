@@ -13,7 +13,7 @@ from baselines.benchmark.configuration import Plan
 from baselines.benchmark.curves import CURVE_COLUMNS, curve_records
 from baselines.benchmark.episodes import Episode, EpisodeFunction
 from baselines.benchmark.files import Value, write_csv, write_text
-from baselines.benchmark.pool import play_all
+from baselines.benchmark.pool import Task, play_all
 from baselines.benchmark.progress import progress
 from baselines.benchmark.report import report
 from baselines.benchmark.store import InputError, Store
@@ -60,12 +60,20 @@ def reproduce(
                 f"{out} already holds {len(episodes)} episodes of this configuration: "
                 "go on with --resume, or choose another folder with --out."
             )
-        with _writable(out):
-            write_text(out / configuration.FILE_NAME, configuration.document(plan, settings, out, jobs))
-            (out / FIGURES).mkdir(exist_ok=True)
-        _play_missing(plan, episode, episodes, out, jobs)
-        with _writable(out):
-            return _write_results(plan, episodes, out)
+        try:
+            with _writable(out):
+                write_text(out / configuration.FILE_NAME, configuration.document(plan, settings, out, jobs))
+                (out / FIGURES).mkdir(exist_ok=True)
+            _play_missing(plan, episode, episodes, jobs)
+            with _writable(out):
+                return _write_results(plan, episodes, out)
+        except KeyboardInterrupt:
+            tasks = plan.tasks()
+            kept = len(tasks) - len(_missing(tasks, episodes))
+            raise Interrupted(
+                f"interrupted: {kept} of {len(tasks)} episodes are kept in {out}; "
+                "the same command with --resume goes on."
+            ) from None
 
 
 def _claim(out: Path) -> None:
@@ -94,23 +102,18 @@ def _writable(out: Path) -> Iterator[None]:
         ) from error
 
 
-def _play_missing(plan: Plan, episode: EpisodeFunction, episodes: Store, out: Path, jobs: int) -> None:
+def _play_missing(plan: Plan, episode: EpisodeFunction, episodes: Store, jobs: int) -> None:
     tasks = plan.tasks()
-    finished = episodes.finished()
-    missing = [(cell, seed) for cell, seed in tasks if (cell.key, seed) not in finished]
-    if not missing:
-        return
-    done = len(tasks) - len(missing)
-    kept = done
-    try:
+    missing = _missing(tasks, episodes)
+    if missing:
         with contextlib.closing(play_all(episode, missing, jobs)) as playing:
-            for (cell, seed), result in progress(playing, total=len(tasks), done=done):
+            for (cell, seed), result in progress(playing, total=len(tasks), done=len(tasks) - len(missing)):
                 episodes.add(cell, seed, result)
-                kept += 1
-    except KeyboardInterrupt:
-        raise Interrupted(
-            f"interrupted: {kept} of {len(tasks)} episodes are kept in {out}; the same command with --resume goes on."
-        ) from None
+
+
+def _missing(tasks: Sequence[Task], episodes: Store) -> list[Task]:
+    finished = episodes.finished()
+    return [(cell, seed) for cell, seed in tasks if (cell.key, seed) not in finished]
 
 
 def _write_results(plan: Plan, episodes: Store, out: Path) -> str:

@@ -7,7 +7,7 @@ the same seeds is a paired one. No result depends on the machine: sums are plain
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -146,8 +146,8 @@ class PooledError:
             )
 
 
-def weighted_share(rows: Sequence[Row], column: str, weights: Mapping[int, float] | None = None) -> float | None:
-    """Mean of a share over episodes, weighted by their scored steps or by the given weights per position.
+def weighted_share(rows: Sequence[Row], column: str, weights: Sequence[float] | None = None) -> float | None:
+    """Mean of a share over episodes, weighted by their scored steps or by one weight per row.
 
     Returns:
         The mean, or None when the column applies to no episode.

@@ -159,5 +159,5 @@ def test_shares_are_weighted_by_steps_and_skip_what_does_not_apply() -> None:
         {"share": None, "estimate_steps": 500},
     ]
     assert weighted_share(rows, "share") == pytest.approx(0.325)
-    assert weighted_share(rows, "share", {0: 1.0, 1: 1.0, 2: 1.0}) == pytest.approx(0.25)
+    assert weighted_share(rows, "share", [1.0, 1.0, 1.0]) == pytest.approx(0.25)
     assert weighted_share(rows[2:], "share") is None

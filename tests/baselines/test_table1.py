@@ -21,14 +21,10 @@ import pytest
 from baselines.benchmark import reproduce as reproduction
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.configuration import Plan, digest, settings
-from baselines.benchmark.curves import curve_records
-from baselines.benchmark.explain import explain
 from baselines.benchmark.files import write_text
-from baselines.benchmark.metrics import Row
-from baselines.benchmark.report import markdown_table, report
 from baselines.benchmark.reproduce import Interrupted, reproduce
 from baselines.benchmark.store import FILE_NAME, InputError, Store
-from baselines.benchmark.table1 import COLUMNS, PAPER_RMSE, Table1, paper_ratio
+from baselines.benchmark.table1 import COLUMNS, PAPER_RMSE, paper_ratio
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).parent
@@ -340,95 +336,6 @@ def test_the_studies_hold_every_combination(finished: Path) -> None:
         assert (line["ratio_to_none"] == "") == (line["estimator"] == "none")
 
 
-def test_curves_are_means_and_bands_over_episodes_ten_times_a_second() -> None:
-    time_s = np.arange(91) / 30.0
-    cell = Cell("emulated", "indoor", "kf")
-    episodes = [np.column_stack([time_s, slope * time_s, 0.1 * slope * time_s]) for slope in np.linspace(1.0, 2.0, 11)]
-    lines = [line for line in curve_records({cell: episodes}) if line["quantity"] == "distance"]
-    assert [line["time_s"] for line in lines] == [index / 10 for index in range(31)]
-    assert [line["mean"] for line in lines] == pytest.approx([15.0 * index / 10 for index in range(31)])
-    assert [line["p10"] for line in lines] == pytest.approx([11.0 * index / 10 for index in range(31)])
-    assert [line["p90"] for line in lines] == pytest.approx([19.0 * index / 10 for index in range(31)])
-
-
-def test_a_curve_stops_where_fewer_than_half_of_the_episodes_are_left() -> None:
-    long, short = (np.column_stack([np.arange(n) / 30.0, np.ones(n), np.ones(n)]) for n in (91, 31))
-    lines = curve_records({Cell("mask", "indoor", "kf"): [long, short, short]})
-    angle = [line for line in lines if line["quantity"] == "angle"]
-    assert angle[-1]["time_s"] == 1.0
-    lines = curve_records({Cell("mask", "indoor", "kf"): [long, long, short]})
-    assert [line["episodes"] for line in lines if line["quantity"] == "angle"] == [3] * 11 + [2] * 20
-
-
-def made(bias: dict[str, float], spread: dict[str, float], **columns: float) -> Table1:
-    """A table whose distances have the given bias and spread, m, by estimator, and whose angles follow the paper."""
-    generator = np.random.default_rng(0)
-    factors = generator.uniform(0.995, 1.005, 40)
-    factors /= np.mean(factors)
-    rows: dict[Cell, list[Row]] = {}
-    for scene in ("corridor", "indoor"):
-        for estimator in ("none", "kf", "akf", "akf_cv"):
-            paper = PAPER_RMSE.get((scene, "angle", estimator), 0.01)
-            rows[Cell("emulated", scene, estimator)] = [
-                {
-                    "estimate_steps": 400,
-                    "ended": "time",
-                    "success": 1,
-                    "angle_rmse_rad": float(paper * factor),
-                    "angle_bias_rad": 0.0,
-                    "distance_rmse_m": float(np.hypot(bias[estimator], spread[estimator]) * factor),
-                    "distance_bias_m": float(bias[estimator] * factor),
-                    **dict.fromkeys(("in_band_share", "measurement_share"), 1.0),
-                    **dict.fromkeys(("angle_inflated_share", "distance_inflated_share"), 0.05),
-                    **dict.fromkeys(("angle_outlier_share", "distance_outlier_share"), 0.01),
-                    **dict.fromkeys(("angle_outlier_square_share", "distance_outlier_square_share"), 0.05),
-                    **dict.fromkeys(("angle_error_correlation", "distance_error_correlation"), 0.9),
-                    **columns,
-                }
-                for factor in factors
-            ]
-    return Table1(rows)
-
-
-def test_a_cell_as_in_the_paper_needs_no_explanation() -> None:
-    table = made(
-        dict.fromkeys(("none", "kf", "akf", "akf_cv"), 0.0), {"none": 0.1, "kf": 0.083, "akf": 0.078, "akf_cv": 0.07}
-    )
-    assert explain(table, "emulated", "corridor", "angle") is None
-    assert "No filter errs by 10.00 cm (paper 15.32)." in str(explain(table, "emulated", "corridor", "distance"))
-    text = report(table)
-    line = next(line for line in text.splitlines() if line.startswith("| corridor | distance |"))
-    assert line.split() == [*"|corridor|distance|0.83|0.83|yes|0.78|0.78|yes|".replace("|", " | ").strip().split(" ")]
-
-
-def test_bias_that_dominates_is_named_with_its_share_and_the_lag() -> None:
-    bias = {"none": -0.112, "kf": -0.18, "akf": -0.18, "akf_cv": -0.112}
-    spread = {"none": 0.05, "kf": 0.03, "akf": 0.03, "akf_cv": 0.03}
-    text = explain(made(bias, spread), "emulated", "corridor", "distance")
-    assert text is not None
-    assert "KF < No filter does not hold; AKF < KF does not hold; the KF ratio is 1.49 (paper 0.83)" in text
-    assert "Bias (-11.20 cm) makes 83% of No filter's squared error" in text
-    assert "without any spread the ratio would still be 0.91" in text
-    effect = "The KF takes bias from -11.20 to -18.00 cm and spread from 5.00 to 3.00 cm"
-    assert f"{effect}: more bias added than spread removed." in text
-    assert "The AKF finds no outlier in any episode and does what the KF does." in text
-    assert "Successive errors of No filter correlate by 0.90: they change too slowly" in text
-    assert "carry 5% of its squared error, which leaves the AKF little to reject" in text
-
-
-def test_hypotheses_are_yes_no_or_undecided_by_their_intervals() -> None:
-    names = ("none", "kf", "akf", "akf_cv")
-    decided = report(made(dict.fromkeys(names, 0.0), dict(zip(names, (0.2, 0.1, 0.05, 0.05), strict=True))))
-    refuted = report(made(dict.fromkeys(names, 0.0), dict(zip(names, (0.1, 0.2, 0.05, 0.05), strict=True))))
-    for text, verdicts in ((decided, ["yes", "yes", "yes"]), (refuted, ["no", "yes", "no"])):
-        line = next(
-            line
-            for line in text.splitlines()
-            if line.startswith("| indoor   | distance (cm) |") and "to" in line and line.count("|") == 8
-        )
-        assert [part.strip() for part in line.split("|")[4:8:2] + line.split("|")[7:8]] == verdicts
-
-
 def test_one_episode_decides_nothing(synthetic: ModuleType, tmp_path: Path) -> None:
     text = run(synthetic, tmp_path / "out", episodes=1)
     assert "undecided" in text
@@ -448,16 +355,6 @@ def test_perfect_measurements_have_no_ratio(synthetic: ModuleType, tmp_path: Pat
     table = records(tmp_path / "out" / "table1.csv")
     assert {line["ratio_to_none"] for line in table} == {""}
     assert not (tmp_path / "out" / "sensitivity.csv").exists()
-
-
-def test_a_markdown_table_is_aligned() -> None:
-    text = markdown_table(["name", "value"], [["a", "1.00"], ["longer", "-10.00"]], left=1)
-    assert text.splitlines() == [
-        "| name   |  value |",
-        "|--------|-------:|",
-        "| a      |   1.00 |",
-        "| longer | -10.00 |",
-    ]
 
 
 FEATURES = ("", "AVX512F AVX512_SKX AVX2 FMA3")

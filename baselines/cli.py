@@ -75,6 +75,16 @@ def _calibrate(parsed: argparse.Namespace) -> int:
     return 0
 
 
+def _speed(parsed: argparse.Namespace) -> int:
+    from baselines import speed
+
+    costs = speed.speed(quick=parsed.quick)
+    print(speed.table(costs))
+    if parsed.out is not None:
+        parsed.out.write_text(speed.document(costs), encoding="utf-8")
+    return 0
+
+
 class _Parser(argparse.ArgumentParser):
     """A parser whose complaint is one sentence, without the usage before it."""
 
@@ -86,11 +96,14 @@ _Commands: TypeAlias = "argparse._SubParsersAction[_Parser]"
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="follow", description="Person following for mobile robots: reproduce, watch, calibrate.")
+    parser = _Parser(
+        prog="follow", description="Person following for mobile robots: reproduce, watch, calibrate, speed."
+    )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_reproduce(commands)
     _add_watch(commands)
     _add_calibrate(commands)
+    _add_speed(commands)
     return parser
 
 
@@ -142,6 +155,13 @@ def _add_calibrate(commands: _Commands) -> None:
     )
     _add_jobs(calibrate)
     calibrate.set_defaults(run=_calibrate)
+
+
+def _add_speed(commands: _Commands) -> None:
+    speed = commands.add_parser("speed", help="measure steps, resets and frames on this machine")
+    speed.add_argument("--quick", action="store_true", help="take a tenth of the samples")
+    speed.add_argument("--out", type=_output_file, metavar="FILE", help="also write the figures as JSON")
+    speed.set_defaults(run=_speed)
 
 
 def _add_jobs(command: argparse.ArgumentParser) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 
@@ -34,6 +34,8 @@ OBSERVATION_OF = {"truth": "state", "emulated": "measurement", "mask": "rgbd_box
 """Perception -> the environment's observation mode that it reads."""
 ESTIMATORS = ("none", "kf", "akf", "akf_cv")
 CONTROLLERS = ("pi",)
+SENSORS = {"truth": "exact", "emulated": "default", "mask": "six_smallest"}
+"""Sensor that a follower expects unless told otherwise: that of the environments, or the rule that reads the depth."""
 
 
 class Policy(Protocol):
@@ -208,6 +210,7 @@ def make_follower(
     controller: str = "pi",
     noise: NoiseModel | None = None,
     alpha: float = 0.05,
+    sensor: str | None = None,
     camera: CameraConfig | None = None,
 ) -> Follower:
     """Return paper B's follower, or a variant of it.
@@ -219,15 +222,20 @@ def make_follower(
         controller: `pi`, the paper's gains.
         noise: R and Q; by default those of the calibration for this perception and scene.
         alpha: significance of the adaptive test.
+        sensor: whose calibrated noise is taken; for `mask` also the rule by which depth is read from the box.
         camera: of the `rgbd_box` observation that `mask` reads; by default the environment's default camera.
     """
     from baselines.benchmark.calibration import noise_model
 
     choose("controller", controller, CONTROLLERS)
+    choose("perception", perception, OBSERVATION_OF)
+    sensor = sensor or SENSORS[perception]
     if noise is None:
-        noise = noise_model(perception, scene)
+        noise = noise_model(perception, scene, sensor)
     make_estimator(estimator, noise, alpha)
-    return Follower(make_perception(perception, camera), lambda: make_estimator(estimator, noise, alpha))
+    rule = cast(Rule, sensor) if perception == "mask" else "six_smallest"
+    perceive = make_perception(perception, camera, rule=rule)
+    return Follower(perceive, lambda: make_estimator(estimator, noise, alpha))
 
 
 def _split(observation: Any) -> list[Any] | None:

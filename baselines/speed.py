@@ -88,9 +88,11 @@ def _stepping(scene: str, count: int) -> list[Cost]:
             observation, _ = env.reset()
             state = None
 
+    waiting, memory = observation, None
+
     def decide() -> None:
-        nonlocal state
-        _, state = policy.predict(observation, state)
+        nonlocal memory
+        _, memory = policy.predict(waiting, memory)
 
     action = np.array((0.4, 0.0), np.float32)
 

@@ -17,6 +17,8 @@ PHYSICS_HZ = 240
 SOLVER_ITERATIONS = 10
 PERSON_RADIUS = 0.25
 PERSON_HEIGHT = 1.75
+CONTACT_BREAKING = 0.0005
+"""Contact points farther apart than this are dropped, m: a rolling wheel keeps one point instead of a trail of four."""
 WHEEL_JOINTS = (0, 1)
 ROTOR_INERTIA = 0.02
 """Wheel with its geared motor's reflected inertia about the axle, kg m^2."""
@@ -41,6 +43,7 @@ class World:
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=1.0 / PHYSICS_HZ,
             numSolverIterations=SOLVER_ITERATIONS,
+            contactBreakingThreshold=CONTACT_BREAKING,
             deterministicOverlappingPairs=1,
             physicsClientId=client,
         )

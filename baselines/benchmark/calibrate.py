@@ -24,13 +24,13 @@ from typing import Any, cast
 import numpy as np
 
 from baselines.benchmark.calibration import CAMERA
+from baselines.benchmark.cells import DEPTH_RULES, SCENES
 from baselines.policy import Follower, NoiseModel, make_estimator, make_perception, perceive_measurement, perceive_state
 from follow_env.config import CameraConfig, MeasurementConfig
 from follow_env.env import FollowEnv
 from tracker.filters import NoFilter
 from tracker.sampling import RULES, Rule
 
-SCENES = ("corridor", "indoor")
 DT = 1.0 / 30.0
 ALPHA = 0.05
 FIRST_SEED = 10_000
@@ -57,8 +57,9 @@ def main(out: Path, jobs: int = 1) -> None:
         for name, shape in _shapes(frames).items():
             sensors[name] = {scene: dataclasses.asdict(_fit(shape(scene), *PAPER_NO_FILTER[scene])) for scene in SCENES}
         wanted = {f"emulated/{name}": by_scene for name, by_scene in sensors.items()}
-        wanted["mask"] = {scene: dataclasses.asdict(_core(frames[scene]["six_smallest"])) for scene in SCENES}
-        wanted["truth"] = dict.fromkeys(SCENES, dataclasses.asdict(TRUTH_NOISE))
+        for rule in DEPTH_RULES:
+            wanted[f"mask/{rule}"] = {scene: dataclasses.asdict(_core(frames[scene][rule])) for scene in SCENES}
+        wanted["truth/exact"] = dict.fromkeys(SCENES, dataclasses.asdict(TRUTH_NOISE))
         tasks = [
             (scene, MeasurementConfig(**by_scene[scene]), motion) for by_scene in wanted.values() for scene in SCENES
         ]

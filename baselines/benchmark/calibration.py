@@ -41,17 +41,16 @@ def sensor(name: str, scene: str) -> dict[str, float]:
     return dict(sensors[choose("sensor", name, sensors)][scene])
 
 
-def noise_model(perception: str, scene: str, sensor_name: str = "default") -> NoiseModel:
+def noise_model(perception: str, scene: str, sensor_name: str) -> NoiseModel:
     """Return R and Q by the rule of the benchmark for a perception in a scene.
 
     Args:
         perception: `truth`, `emulated` or `mask`.
         scene: `corridor` or `indoor`.
-        sensor_name: of the emulated sensor; `default` is that of the environments.
+        sensor_name: of the emulated sensor (`default` is that of the environments) or the depth rule of `mask`.
     """
     noise = settings()["noise"]
-    key = f"{perception}/{sensor_name}" if perception == "emulated" else perception
-    entry = noise[choose("perception", key, noise)]
+    entry = noise[choose("noise of", f"{perception}/{sensor_name}", noise)]
     entry = entry[choose("scene", scene, entry)]
     return NoiseModel(tuple(entry["measurement"]), tuple(entry["process"]), tuple(entry["acceleration"]))
 
@@ -84,5 +83,12 @@ def follower(cell: Cell, camera: Mapping[str, int] = CAMERA) -> Follower:
     q_bearing, q_distance = noise.process
     scaled = NoiseModel(noise.measurement, (cell.q_scale * q_bearing, cell.q_scale * q_distance), noise.acceleration)
     return make_follower(
-        cell.estimator, cell.perception, cell.scene, cell.controller, scaled, cell.alpha, CameraConfig(**camera)
+        cell.estimator,
+        cell.perception,
+        cell.scene,
+        cell.controller,
+        scaled,
+        cell.alpha,
+        cell.sensor,
+        CameraConfig(**camera),
     )

@@ -9,8 +9,11 @@ PERCEPTIONS = ("truth", "emulated", "mask")
 SCENES = ("corridor", "indoor")
 ESTIMATORS = ("none", "kf", "akf", "akf_cv")
 ENVIRONMENT_IDS = {"corridor": "follow_env/Corridor-v0", "indoor": "follow_env/Indoor-v0"}
-FITTED = "fitted"
-"""Name of the emulated sensor that is fitted to the paper's No filter row."""
+SENSORS = {"truth": "exact", "emulated": "fitted", "mask": "six_smallest"}
+"""Table 1's sensor at each perception: the emulated one that is fitted to the paper's No filter row, and the rule by
+which depth is read from the rendered box."""
+DEPTH_RULES = ("six_smallest", "grid_mean", "centroid")
+"""Rules of `tracker.sampling` that are compared on rendered frames."""
 
 Q_SCALES = (0.1, 0.3, 1.0, 3.0, 10.0)
 ALPHAS = (0.01, 0.05, 0.1)
@@ -27,7 +30,7 @@ class Cell:
         controller: Name of the controller.
         q_scale: Multiple of the process noise that the rule for Q gives.
         alpha: Significance of the adaptive filter's outlier test.
-        sensor: Name of the emulated sensor; ``fitted`` outside the family of sensors.
+        sensor: Name of the emulated sensor, or the depth rule of ``mask``; empty takes that of ``SENSORS``.
     """
 
     perception: str
@@ -36,7 +39,7 @@ class Cell:
     controller: str = "pi"
     q_scale: float = 1.0
     alpha: float = 0.05
-    sensor: str = FITTED
+    sensor: str = ""
 
     def __post_init__(self) -> None:
         for field, value, known in (
@@ -46,6 +49,8 @@ class Cell:
         ):
             if value not in known:
                 raise ValueError(f"{field} is {value!r}, but it must be one of {', '.join(known)}.")
+        if not self.sensor:
+            object.__setattr__(self, "sensor", SENSORS[self.perception])
         if not 0.0 < self.q_scale < float("inf"):
             raise ValueError(f"q_scale is {self.q_scale}, but a multiple of Q must be positive and finite.")
         if not 0.0 < self.alpha < 1.0:
@@ -93,7 +98,17 @@ def family_cells(sensors: Iterable[str]) -> list[Cell]:
     """
     return [
         Cell("emulated", scene, estimator, sensor=sensor)
-        for sensor in dict.fromkeys((FITTED, *sensors))
+        for sensor in dict.fromkeys((SENSORS["emulated"], *sensors))
+        for scene in SCENES
+        for estimator in ("none", "kf", "akf")
+    ]
+
+
+def rule_cells() -> list[Cell]:
+    """How the result depends on the rule that reads a depth from the box, on rendered frames."""
+    return [
+        Cell("mask", scene, estimator, sensor=rule)
+        for rule in DEPTH_RULES
         for scene in SCENES
         for estimator in ("none", "kf", "akf")
     ]

@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from baselines.benchmark import metrics
-from baselines.benchmark.cells import ENVIRONMENT_IDS, Cell, family_cells, sensitivity_cells, table1_cells
+from baselines.benchmark.cells import ENVIRONMENT_IDS, Cell, family_cells, rule_cells, sensitivity_cells, table1_cells
 
 FILE_NAME = "config.json"
 EPISODES = {"truth": 100, "emulated": 100, "mask": 20}
 """Episodes per cell of Table 1 unless told otherwise, by perception: a rendered episode costs far more."""
 
-_STUDY_PART = 5
+_STUDY_PART = {"emulated": 5, "mask": 2}
 _PACKAGES = (
     *("follow-env", "gymnasium", "matplotlib", "numpy", "opencv-python-headless"),
     *("pybullet", "scipy", "tqdm"),
@@ -36,14 +36,14 @@ class Plan:
         episodes: Episodes per cell of the table, by perception.
         sensitivity: Cells of the sensitivity study; empty without the emulated perception.
         family: Cells of the family of sensors; empty without the emulated perception.
-        study_episodes: Episodes per cell of the two studies.
+        rules: Cells of the comparison of depth rules; empty without the mask perception.
     """
 
     table: tuple[Cell, ...]
     episodes: Mapping[str, int]
     sensitivity: tuple[Cell, ...]
     family: tuple[Cell, ...]
-    study_episodes: int
+    rules: tuple[Cell, ...]
 
     @classmethod
     def of(cls, perceptions: list[str], episodes: int | None, sensors: list[str]) -> Plan:
@@ -56,28 +56,27 @@ class Plan:
         """
         table = tuple(table1_cells(perceptions))
         counts = {cell.perception: EPISODES[cell.perception] if episodes is None else episodes for cell in table}
-        studies = "emulated" in counts
         return cls(
             table=table,
             episodes=counts,
-            sensitivity=tuple(sensitivity_cells()) if studies else (),
-            family=tuple(family_cells(sensors)) if studies else (),
-            study_episodes=max(2, counts["emulated"] // _STUDY_PART) if studies else 0,
+            sensitivity=tuple(sensitivity_cells()) if "emulated" in counts else (),
+            family=tuple(family_cells(sensors)) if "emulated" in counts else (),
+            rules=tuple(rule_cells()) if "mask" in counts else (),
         )
 
     def table_seeds(self, cell: Cell) -> range:
         """Seeds of a cell of the table; calibration uses others."""
         return range(self.episodes[cell.perception])
 
-    @property
-    def study_seeds(self) -> range:
-        """Seeds of the cells of the two studies: the table's first, so that what both need is played once."""
-        return range(self.study_episodes)
+    def study_seeds(self, cell: Cell) -> range:
+        """Seeds of a cell of the studies: the table's first, so that what both need is played once."""
+        return range(max(2, self.episodes[cell.perception] // _STUDY_PART[cell.perception]))
 
     def tasks(self) -> list[tuple[Cell, int]]:
         """Every cell and seed that is needed, each once, cells that share an environment one after another."""
         wanted = [(cell, seed) for cell in self.table for seed in self.table_seeds(cell)]
-        wanted += [(cell, seed) for cell in (*self.sensitivity, *self.family) for seed in self.study_seeds]
+        studies = (*self.sensitivity, *self.family, *self.rules)
+        wanted += [(cell, seed) for cell in studies for seed in self.study_seeds(cell)]
         return list(dict.fromkeys(wanted))
 
 
@@ -95,6 +94,7 @@ def settings(plan: Plan, calibration: Mapping[str, Any]) -> dict[str, Any]:
             "table1": [cell.key for cell in plan.table],
             "sensitivity": [cell.key for cell in plan.sensitivity],
             "family": [cell.key for cell in plan.family],
+            "rules": [cell.key for cell in plan.rules],
         },
         "calibration": dict(calibration),
         "columns": list(metrics.COLUMNS),
@@ -113,8 +113,10 @@ def document(plan: Plan, settings: Mapping[str, Any], folder: Path, jobs: int) -
         "settings": settings,
         "settings_sha256": digest(settings),
         "seeds": {
-            **{f"table1/{perception}": list(range(count)) for perception, count in plan.episodes.items()},
-            "studies": list(plan.study_seeds),
+            "table1": {perception: list(range(count)) for perception, count in plan.episodes.items()},
+            "studies": {
+                cell.perception: list(plan.study_seeds(cell)) for cell in (*plan.sensitivity, *plan.family, *plan.rules)
+            },
         },
         "packages": packages(),
         "machine": machine(),

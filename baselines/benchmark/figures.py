@@ -83,16 +83,15 @@ def draw_curves(records: Sequence[Record], folder: Path) -> list[Path]:
     return paths
 
 
-def draw_sensitivity(records: Sequence[Record], folder: Path) -> Path:
+def draw_sensitivity(records: Sequence[Record], path: Path) -> None:
     """Draw the ratio to No filter over the multiple of Q, a line per alpha, with the paper's ratios.
 
     Args:
         records: ``studies.study_records`` of the sensitivity cells.
-        folder: Existing folder for the picture.
+        path: The picture; its folder exists.
     """
     from matplotlib.ticker import FuncFormatter, LogLocator
 
-    path = folder / "sensitivity.png"
     with _picture(path, width=7.2, height=5.8) as figure:
         panels = _panels(figure, share_y="col")
         for scene, quantity, axes in panels:
@@ -120,17 +119,15 @@ def draw_sensitivity(records: Sequence[Record], folder: Path) -> Path:
             axes.set_title(f"{scene.capitalize()}, {quantity}", loc="left")
         _label_outside(panels, x="process noise, multiple of the rule's Q", y="RMSE, ratio to No filter")
         _legend_below(figure, panels[0][2], columns=3)
-    return path
 
 
-def draw_family(records: Sequence[Record], folder: Path) -> Path:
-    """Draw the KF's and AKF's ratio to No filter for each sensor of the family, with the paper's ratios.
+def draw_sensors(records: Sequence[Record], path: Path) -> None:
+    """Draw the KF's and AKF's ratio to No filter for each sensor or depth rule, with the paper's ratios.
 
     Args:
-        records: ``studies.study_records`` of the family's cells.
-        folder: Existing folder for the picture.
+        records: ``studies.study_records`` of the cells.
+        path: The picture; its folder exists.
     """
-    path = folder / "family.png"
     sensors = list(dict.fromkeys(str(record["sensor"]) for record in records))
     with _picture(path, width=7.2, height=2.6 + 0.56 * len(sensors)) as figure:
         panels = _panels(figure, share_y=True)
@@ -166,7 +163,6 @@ def draw_family(records: Sequence[Record], folder: Path) -> Path:
         _label_outside(panels, x="RMSE, ratio to No filter")
         panels[0][2].set_xlim(left=0.0)
         _legend_below(figure, panels[0][2], columns=4)
-    return path
 
 
 def _draw_curve(axes: Axes, records: Sequence[Record], estimator: str) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from baselines.benchmark.cells import ESTIMATORS, SCENES
 from baselines.benchmark.explain import HYPOTHESES, NAMES, TOLERANCE, explain, number, within
 from baselines.benchmark.statistics import Difference, weighted_share
+from baselines.benchmark.studies import Record
 from baselines.benchmark.table1 import PAPER_RMSE, QUANTITIES, UNITS, Table1, paper_ratio
 
 _PERCEPTIONS = {
@@ -17,8 +18,13 @@ _PERCEPTIONS = {
 _VERDICT = {True: "yes", None: "undecided", False: "no"}
 
 
-def report(table: Table1) -> str:
-    """The whole report as Markdown that also reads well on a terminal."""
+def report(table: Table1, rules: Sequence[Record] = ()) -> str:
+    """The whole report as Markdown that also reads well on a terminal.
+
+    Args:
+        table: Measured cells.
+        rules: Records of the comparison of depth rules, if it was made.
+    """
     parts = [
         "# Table 1, reproduced",
         "RMSE over all steps of all episodes, with 95 % bootstrap intervals over whole episodes; "
@@ -40,6 +46,13 @@ def report(table: Table1) -> str:
             _explanations(table, perception),
             "### Following",
             _following(table, perception),
+        ]
+    if rules:
+        parts += [
+            "## Depth rules on rendered frames",
+            f"The `mask` perception with other rules that read a depth from the same box, "
+            f"{rules[0]['episodes']} episodes per cell. Outliers lie beyond three robust standard deviations.",
+            _rules(rules),
         ]
     return "\n\n".join(parts) + "\n"
 
@@ -124,6 +137,40 @@ def _ratios(table: Table1, perception: str) -> str:
                 row += [_ratio(ratio), _ratio(paper), {None: "–", True: "yes", False: "no"}[within(ratio, paper)]]
             rows.append(row)
     return markdown_table(header, rows, left=2)
+
+
+def _rules(records: Sequence[Record]) -> str:
+    header = [
+        "scene",
+        "quantity",
+        "depth rule",
+        "estimator",
+        "RMSE",
+        "bias",
+        "spread",
+        "outliers",
+        "ratio",
+        "paper ratio",
+    ]
+    rows = []
+    for scene in SCENES:
+        for quantity in QUANTITIES:
+            for record in records:
+                if (record["scene"], record["quantity"]) != (scene, quantity):
+                    continue
+                share, ratio, paper = record["outlier_share"], record["ratio_to_none"], record["paper_ratio"]
+                rows.append(
+                    [
+                        scene,
+                        f"{quantity} ({UNITS[quantity]})",
+                        str(record["sensor"]),
+                        NAMES[str(record["estimator"])],
+                        *(number(float(str(record[column])), quantity) for column in ("rmse", "bias", "spread")),
+                        "–" if share is None else f"{float(str(share)):.1%}",
+                        *("–" if value is None else f"{float(str(value)):.2f}" for value in (ratio, paper)),
+                    ]
+                )
+    return markdown_table(header, rows, left=4)
 
 
 def _explanations(table: Table1, perception: str) -> str:

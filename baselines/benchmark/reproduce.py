@@ -17,7 +17,7 @@ from baselines.benchmark.pool import Task, play_all
 from baselines.benchmark.progress import progress
 from baselines.benchmark.report import report
 from baselines.benchmark.store import InputError, Store
-from baselines.benchmark.studies import FAMILY_COLUMNS, SENSITIVITY_COLUMNS, study_records
+from baselines.benchmark.studies import FAMILY_COLUMNS, SENSITIVITY_COLUMNS, Record, study_records
 from baselines.benchmark.table1 import COLUMNS, Table1
 
 FIGURES = "figures"
@@ -124,19 +124,24 @@ def _write_results(plan: Plan, episodes: Store, out: Path) -> str:
     curves = curve_records({cell: [played.curve for played in group] for cell, group in table.items()})
     write_csv(out / "curves.csv", CURVE_COLUMNS, curves, _DIGITS)
     drawn = figures.draw_curves(curves, out / FIGURES)
+    rules: list[Record] = []
     for name, cells, columns, draw in (
         ("sensitivity", plan.sensitivity, SENSITIVITY_COLUMNS, figures.draw_sensitivity),
-        ("family", plan.family, FAMILY_COLUMNS, figures.draw_family),
+        ("family", plan.family, FAMILY_COLUMNS, figures.draw_sensors),
+        ("rules", plan.rules, FAMILY_COLUMNS, figures.draw_sensors),
     ):
         if cells:
-            study = {cell: [episodes.episode(cell, seed) for seed in plan.study_seeds] for cell in cells}
+            study = {cell: [episodes.episode(cell, seed) for seed in plan.study_seeds(cell)] for cell in cells}
             write_csv(out / f"{name}_episodes.csv", metrics.COLUMNS, _rows(study))
             records = study_records({cell: [played.row for played in group] for cell, group in study.items()})
             write_csv(out / f"{name}.csv", columns, records, _DIGITS)
-            drawn.append(draw(records, out / FIGURES))
+            drawn.append(out / FIGURES / f"{name}.png")
+            draw(records, drawn[-1])
+            if name == "rules":
+                rules = records
     measured = Table1({cell: [played.row for played in group] for cell, group in table.items()})
     write_csv(out / "table1.csv", COLUMNS, measured.records(), _DIGITS)
-    text = report(measured)
+    text = report(measured, rules)
     pictures = "\n\n".join(f"![{path.stem.replace('_', ' ')}]({FIGURES}/{path.name})" for path in drawn)
     write_text(out / "table1.md", f"{text}\n## Figures\n\n{pictures}\n")
     return text

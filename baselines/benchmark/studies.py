@@ -1,4 +1,4 @@
-"""The two studies beside Table 1: how its ratios move with Q and alpha, and with the sensor that is assumed."""
+"""The studies beside Table 1: how its ratios move with Q and alpha, with the assumed sensor and with the depth rule."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from baselines.benchmark.table1 import QUANTITIES, UNITS, paper_ratio
 
 _RESULTS = (
     *("scene", "quantity", "unit", "episodes", "rmse", "ci_low", "ci_high", "bias", "spread"),
-    *("ratio_to_none", "ratio_low", "ratio_high", "inflated_share", "paper_ratio"),
+    *("outlier_share", "ratio_to_none", "ratio_low", "ratio_high", "inflated_share", "paper_ratio"),
 )
 SENSITIVITY_COLUMNS = ("estimator", "q_scale", "alpha", *_RESULTS)
 FAMILY_COLUMNS = ("sensor", "estimator", *_RESULTS)
@@ -47,6 +47,7 @@ def study_records(rows: Mapping[Cell, Sequence[Row]]) -> list[Record]:
                 "rmse": error.rmse,
                 "bias": error.bias,
                 "spread": error.spread,
+                "outlier_share": weighted_share(cell_rows, f"{quantity}_outlier_share"),
             }
             record["ci_low"], record["ci_high"] = error.interval or (None, None)
             if cell.estimator != "none":

@@ -34,6 +34,14 @@ class Sensor:
 
 
 SENSOR = {
+    ("corridor", "six_smallest"): Sensor(-0.11, (0.012, 0.01), 0.0),
+    ("indoor", "six_smallest"): Sensor(-0.11, (0.012, 0.01), 0.0),
+    ("corridor", "centroid"): Sensor(-0.10, (0.012, 0.01), 0.0),
+    ("indoor", "centroid"): Sensor(-0.10, (0.012, 0.01), 0.0),
+    ("corridor", "grid_mean"): Sensor(0.03, (0.012, 0.09), 0.05),
+    ("indoor", "grid_mean"): Sensor(0.03, (0.012, 0.09), 0.10),
+    ("corridor", "exact"): Sensor(0.0, (0.01, 0.1), 0.0),
+    ("indoor", "exact"): Sensor(0.0, (0.01, 0.1), 0.0),
     ("corridor", "fitted"): Sensor(-0.115, (0.0135, 0.09), 0.01),
     ("indoor", "fitted"): Sensor(-0.115, (0.0165, 0.101), 0.05),
     ("corridor", "clean"): Sensor(-0.12, (0.014, 0.10), 0.0),
@@ -105,7 +113,7 @@ class World(gym.Env):
 
 
 def follower(cell: Cell) -> Follower:
-    sensor = SENSOR["corridor" if cell.perception == "truth" else cell.scene, cell.sensor]
+    sensor = SENSOR[cell.scene, cell.sensor]
     noise = NoiseModel(
         measurement=(sensor.noise[0] ** 2, sensor.noise[1] ** 2),
         process=(2e-4 * cell.q_scale, 2e-3 * cell.q_scale),

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from baselines.benchmark import pool
-from baselines.benchmark.cells import Cell, family_cells, sensitivity_cells, table1_cells
+from baselines.benchmark.cells import Cell, family_cells, rule_cells, sensitivity_cells, table1_cells
 from baselines.benchmark.configuration import Plan
 from baselines.benchmark.pool import EpisodeError, play_all
 from baselines.benchmark.progress import progress
@@ -43,8 +43,9 @@ def test_table_1_has_every_scene_and_estimator_in_one_order() -> None:
 
 def test_keys_are_distinct_and_never_change() -> None:
     cells = {*table1_cells(["truth", "emulated", "mask"]), *sensitivity_cells(), *family_cells(["white", "bursts"])}
+    cells.update(rule_cells())
     assert len({cell.key for cell in cells}) == len(cells)
-    assert Cell("mask", "indoor", "akf", q_scale=3, alpha=0.1).key == "mask/indoor/akf/pi/q3.0/a0.1/fitted"
+    assert Cell("mask", "indoor", "akf", q_scale=3, alpha=0.1).key == "mask/indoor/akf/pi/q3.0/a0.1/six_smallest"
 
 
 @pytest.mark.parametrize(
@@ -68,22 +69,26 @@ def test_a_plan_plays_each_episode_once_and_covers_every_study() -> None:
     tasks = plan.tasks()
     assert len(tasks) == len(set(tasks))
     assert plan.episodes == {"emulated": 100, "mask": 20}
-    assert plan.study_episodes == 20
+    assert {len(plan.study_seeds(cell)) for cell in (*plan.sensitivity, *plan.family)} == {20}
+    assert {len(plan.study_seeds(cell)) for cell in plan.rules} == {10}
     assert {(cell, seed) for cell in plan.table for seed in plan.table_seeds(cell)} <= set(tasks)
     assert {(cell, seed) for cell in (*sensitivity_cells(), *family_cells(["white"])) for seed in range(20)} <= set(
         tasks
     )
-    assert len(tasks) == 8 * 100 + 8 * 20 + 2 * (5 + 15 - 2) * 20 + 2 * 3 * 20
+    assert {(cell, seed) for cell in rule_cells() for seed in range(10)} <= set(tasks)
+    assert len(tasks) == 8 * 100 + 8 * 20 + 2 * (5 + 15 - 2) * 20 + 2 * 3 * 20 + 2 * 2 * 3 * 10
 
 
 @pytest.mark.parametrize(("episodes", "studies"), [(1, 2), (9, 2), (50, 10)])
 def test_studies_take_a_fifth_of_the_episodes_but_two_at_least(episodes: int, studies: int) -> None:
-    assert Plan.of(["emulated"], episodes, []).study_episodes == studies
+    plan = Plan.of(["emulated"], episodes, [])
+    assert plan.study_seeds(plan.family[0]) == range(studies)
 
 
-def test_without_the_emulated_sensor_there_are_no_studies() -> None:
-    plan = Plan.of(["truth"], 3, ["white"])
-    assert (plan.sensitivity, plan.family, len(plan.tasks())) == ((), (), 2 * 4 * 3)
+def test_a_study_is_made_only_where_its_perception_is() -> None:
+    truth, mask = Plan.of(["truth"], 3, ["white"]), Plan.of(["mask"], 3, ["white"])
+    assert (truth.sensitivity, truth.family, truth.rules, len(truth.tasks())) == ((), (), (), 2 * 4 * 3)
+    assert (mask.sensitivity, mask.family, len(mask.rules)) == ((), (), 3 * 2 * 3)
 
 
 def test_every_observation_of_an_episode_is_scored(synthetic: ModuleType) -> None:

@@ -256,7 +256,7 @@ def test_config_names_what_made_the_results(synthetic: ModuleType, finished: Pat
     assert config["settings_sha256"] == hashlib.sha256(canonical.encode()).hexdigest()
     assert config["settings"]["calibration"] == synthetic.CALIBRATION
     assert len(config["settings"]["cells"]["table1"]) == 8
-    assert config["seeds"] == {"table1/emulated": [0, 1, 2, 3], "studies": [0, 1]}
+    assert config["seeds"] == {"table1": {"emulated": [0, 1, 2, 3]}, "studies": {"emulated": [0, 1]}}
     assert config["packages"]["numpy"] == np.__version__
     assert {"platform", "python", "cpu"} <= config["machine"].keys()
     assert str(finished.parent) not in json.dumps(config)
@@ -334,6 +334,21 @@ def test_the_studies_hold_every_combination(finished: Path) -> None:
     assert [*dict.fromkeys(line["sensor"] for line in family)] == ["fitted", "clean", "heavy_tails"]
     for line in (*sensitivity, *family):
         assert (line["ratio_to_none"] == "") == (line["estimator"] == "none")
+
+
+def test_the_depth_rules_are_compared_on_rendered_frames(synthetic: ModuleType, tmp_path: Path) -> None:
+    plan = Plan.of(["mask"], 4, [])
+    text = run(synthetic, tmp_path / "mask", plan=plan)
+    rules = records(tmp_path / "mask" / "rules.csv")
+    assert [*dict.fromkeys(line["sensor"] for line in rules)] == ["six_smallest", "grid_mean", "centroid"]
+    shares = {
+        line["sensor"]: float(line["outlier_share"])
+        for line in rules
+        if (line["scene"], line["quantity"], line["estimator"]) == ("indoor", "distance", "none")
+    }
+    assert shares["grid_mean"] > 0.05 > shares["six_smallest"]
+    assert text.count("| grid_mean") == 2 * 2 * 3
+    assert (tmp_path / "mask" / "figures" / "rules.png").exists()
 
 
 def test_one_episode_decides_nothing(synthetic: ModuleType, tmp_path: Path) -> None:

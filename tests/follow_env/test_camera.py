@@ -1,6 +1,5 @@
-"""Camera, depth sensor and the person that is seen: pictures against geometry computed here."""
+"""The camera: pictures of places and of the person against geometry computed here."""
 
-import itertools
 import math
 
 import gymnasium
@@ -9,10 +8,8 @@ import pytest
 
 import follow_env
 from follow_env.camera import CameraPose, PinholeCamera, make_renderer
-from follow_env.camera.depth import DepthSensor
-from follow_env.config import CameraConfig, DepthConfig
+from follow_env.config import CameraConfig
 from follow_env.person import body, gait
-from follow_env.physics import PERSON_RADIUS
 from follow_env.scene import Box, Light, Material, Scene
 
 GREY = Material((0.5, 0.5, 0.5))
@@ -25,9 +22,6 @@ POSES = {
     "backwards": CameraPose(-2.0, 1.0, 1.3, 3.0),
 }
 NOBODY = gait.pose(-500.0, 0.0, 0.0, 0.0, 0.0)
-EXACT = DepthConfig(axial_noise=0.0, disparity_step=0.0, min_range=0.0, max_range=math.inf, edge_band=0)
-XTION_HFOV = math.radians(57.5)
-PHASES = np.linspace(0.0, 1.0, 48, endpoint=False)
 
 
 def scene(*boxes):
@@ -152,21 +146,9 @@ def test_the_edge_of_the_picture_lies_at_half_the_field_of_view():
     assert u == pytest.approx(0.0, abs=1e-9)
 
 
-def vertices(person, clothes="blue"):
-    """World vertices of every segment by name: each mesh moved by its pose's quaternion and position."""
-    placed = {}
-    for segment, (position, (x, y, z, w)) in zip(body.segments(clothes), person, strict=True):
-        axis = np.array((x, y, z))
-        assert x * x + y * y + z * z + w * w == pytest.approx(1.0)
-        points, _, _ = segment.mesh()
-        turned = points + 2.0 * np.cross(axis, np.cross(axis, points) + w * points)
-        placed[segment.name] = turned + np.array(position)
-    return placed
-
-
 @pytest.mark.parametrize("pose", POSES.values(), ids=POSES)
 @pytest.mark.parametrize(("ahead", "left"), [(1.5, 0.0), (2.5, 0.6), (4.0, -1.0)])
-def test_the_persons_pixels_fill_the_projection_of_the_body(pose, ahead, left):
+def test_the_persons_pixels_fill_the_projection_of_the_body(vertices, pose, ahead, left):
     """The box of the id mask against the projected vertices, clipped to the picture: within a pixel."""
     x, y, _ = world_point(pose, ahead, left, 0.0)
     person = gait.pose(x, y, pose.yaw + 0.4, 3.3, 0.9)
@@ -272,195 +254,3 @@ def test_visible_agrees_with_the_picture(name):
             assert not info["visible"], (seed, place)
     env.close()
     assert 5 < sum(seen) < 55
-
-
-@pytest.mark.parametrize("z", [0.6, 1.0, 2.0, 4.0, 7.0])
-def test_axial_noise_grows_as_stated(z):
-    """sigma(z) = 0.0012 + 0.0019 (z - 0.4)^2 m, without bias (quantisation off)."""
-    sensor = DepthSensor(DepthConfig(disparity_step=0.0, edge_band=0), XTION_HFOV)
-    read = sensor.corrupt(np.full((200, 250), z, np.float32), np.random.default_rng(5)).astype(float)
-    sigma = 0.0012 + 0.0019 * (z - 0.4) ** 2
-    assert (read > 0.0).all()
-    assert read.std() == pytest.approx(sigma, rel=0.02)
-    assert read.mean() == pytest.approx(z, abs=5.0 * sigma / math.sqrt(50000))
-    assert abs(np.corrcoef(read[:, 1:].ravel(), read[:, :-1].ravel())[0, 1]) < 0.02
-
-
-def test_the_noise_scale_is_a_factor():
-    depth = np.full((200, 250), 2.0, np.float32)
-    spread = [
-        DepthSensor(DepthConfig(axial_noise=scale, disparity_step=0.0), XTION_HFOV)
-        .corrupt(depth, np.random.default_rng(6))
-        .std()
-        for scale in (1.0, 3.0)
-    ]
-    assert spread[1] / spread[0] == pytest.approx(3.0, rel=1e-3)
-
-
-def test_quantisation_steps_grow_with_the_square_of_the_depth():
-    """Disparity f b / z in eighths of a pixel: levels z^2 / (8 f b) apart (3 mm at 1 m, 2.6 cm at 3 m)."""
-    ramp = np.linspace(0.6, 7.9, 200001, dtype=np.float32)[None, :]
-    sensor = DepthSensor(DepthConfig(axial_noise=0.0, edge_band=0), XTION_HFOV)
-    read = sensor.corrupt(ramp, np.random.default_rng(7))[0].astype(float)
-    levels = np.unique(read)
-    middle = 0.5 * (levels[1:] + levels[:-1])
-    focal_baseline = 320.0 / math.tan(XTION_HFOV / 2.0) * 0.075
-    assert np.diff(levels) == pytest.approx(middle**2 / (8.0 * focal_baseline), rel=0.02)
-    assert np.interp(1.0, middle, np.diff(levels)) == pytest.approx(0.003, abs=0.0002)
-    assert np.interp(3.0, middle, np.diff(levels)) == pytest.approx(0.026, abs=0.0007)
-    step = ramp[0] ** 2 / (8.0 * focal_baseline)
-    assert (np.abs(read - ramp[0]) < 0.53 * step).all()
-    assert focal_baseline / levels * 8.0 == pytest.approx(np.round(focal_baseline / levels * 8.0), abs=1e-3)
-
-
-def test_depth_out_of_range_is_no_reading():
-    depth = np.array([[0.1, 0.49, 0.51, 7.99, 8.01, 30.0]], np.float32)
-    sensor = DepthSensor(DepthConfig(axial_noise=0.0, disparity_step=0.0, edge_band=0), XTION_HFOV)
-    read = sensor.corrupt(depth, np.random.default_rng(8))
-    assert (read > 0.0).tolist() == [[False, False, True, True, False, False]]
-    assert read[0, 2:4] == pytest.approx(depth[0, 2:4])
-
-
-@pytest.mark.parametrize("band", [1, 2])
-def test_depth_edges_are_holes_as_wide_as_stated(band):
-    depth = np.full((12, 20), 3.0, np.float32)
-    depth[:, :10] = 1.0
-    sensor = DepthSensor(DepthConfig(axial_noise=0.0, disparity_step=0.0, edge_band=band), XTION_HFOV)
-    holes = sensor.corrupt(depth, np.random.default_rng(9)) == 0.0
-    wanted = np.zeros_like(holes)
-    wanted[:, 10 - band : 10 + band] = True
-    assert (holes == wanted).all()
-
-
-def test_smaller_jumps_than_the_limit_are_no_edges():
-    holes = {}
-    for jump in (0.14, 0.16):
-        depth = np.full((12, 20), 1.0, np.float32)
-        depth[5:, :] -= jump
-        sensor = DepthSensor(DepthConfig(axial_noise=0.0, disparity_step=0.0), XTION_HFOV)
-        holes[jump] = int((sensor.corrupt(depth, np.random.default_rng(10)) == 0.0).sum())
-    assert holes == {0.14: 0, 0.16: 2 * 20}
-
-
-def test_an_exact_sensor_changes_nothing_and_a_noisy_one_follows_its_generator():
-    depth = np.random.default_rng(11).uniform(0.2, 9.0, (30, 40)).astype(np.float32)
-    assert (DepthSensor(EXACT, XTION_HFOV).corrupt(depth, np.random.default_rng(0)) == depth).all()
-    noisy = DepthSensor(DepthConfig(edge_band=0), XTION_HFOV)
-    one, two, other = (noisy.corrupt(depth, np.random.default_rng(seed)) for seed in (1, 1, 2))
-    assert (one == two).all()
-    assert (one != other).any()
-    assert one.dtype == np.float32
-
-
-def test_meshes_enclose_their_profile_and_their_normals_point_outwards():
-    """The signed volume is that of the stacked ellipses, which a hole or a face turned inside out would change."""
-    for segment in body.segments():
-        points, normals, indices = segment.mesh()
-        assert np.sqrt((normals**2).sum(axis=1)) == pytest.approx(1.0)
-        side = np.sqrt((points[:, :2] ** 2).sum(axis=1)) > 1e-3
-        assert (np.einsum("ij,ij->i", normals[side][:, :2], points[side][:, :2]) > -1e-9).all(), segment.name
-        triangles = points[indices.reshape(-1, 3)]
-        volume = np.einsum("ij,ij->i", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])).sum() / 6.0
-        radii = np.array([w * d for _, w, d in segment.profile])
-        shares = np.array([share for share, _, _ in segment.profile]) * segment.length
-        wanted = math.pi * np.trapezoid(radii, shares)
-        assert volume == pytest.approx(wanted, rel=0.08), segment.name
-
-
-def test_a_standing_adult_is_175_cm_tall_with_both_feet_on_the_floor():
-    placed = vertices(gait.pose(0.0, 0.0, 0.0, 5.0, 0.0))
-    assert max(part[:, 2].max() for part in placed.values()) == pytest.approx(1.75, abs=0.03)
-    for foot in ("foot_left", "foot_right"):
-        assert placed[foot][:, 2].min() == pytest.approx(0.0, abs=0.01)
-
-
-@pytest.mark.parametrize("speed", [0.3, 0.6, 0.92])
-def test_the_lower_foot_is_on_the_floor_and_nothing_below_it(speed):
-    """The lowest point of every pose of the gait cycle, from the meshes."""
-    for phase in PHASES:
-        placed = vertices(gait.pose(0.0, 0.0, 0.0, float(phase) * gait.STRIDE, speed))
-        lowest = min(part[:, 2].min() for part in placed.values())
-        assert lowest == pytest.approx(0.0, abs=0.02), phase
-
-
-def test_the_visible_body_is_where_the_collision_body_is():
-    """The trunk stays inside the capsule (25 cm around the axis), the limbs within a step of it."""
-    for phase in PHASES:
-        placed = vertices(gait.pose(2.0, -1.0, 0.8, float(phase) * gait.STRIDE, 0.92))
-        away = {name: np.hypot(part[:, 0] - 2.0, part[:, 1] + 1.0).max() for name, part in placed.items()}
-        for name in ("trunk", "hips", "neck", "head", "hair"):
-            assert away[name] < PERSON_RADIUS, (phase, name)
-        assert max(away.values()) < 0.65, phase
-        centre = np.mean([placed[name].mean(axis=0) for name in ("trunk", "hips")], axis=0)
-        assert centre[:2] == pytest.approx((2.0, -1.0), abs=0.05)
-
-
-@pytest.mark.parametrize("heading", [0.0, 1.0, math.pi / 2, -2.5])
-def test_the_person_faces_where_the_heading_points(heading):
-    """Toes before heels, knees bending forward, the left foot on the left."""
-    forward = np.array((math.cos(heading), math.sin(heading)))
-    leftward = np.array((-math.sin(heading), math.cos(heading)))
-    for phase in PHASES[::4]:
-        placed = vertices(gait.pose(1.0, 2.0, heading, float(phase) * gait.STRIDE, 0.92))
-        for side in ("left", "right"):
-            foot = placed[f"foot_{side}"]
-            heel, toe = foot[:14].mean(axis=0), foot[-14:].mean(axis=0)
-            assert (toe - heel)[:2] @ forward > 0.15, (phase, side)
-            shin, thigh = placed[f"shin_{side}"], placed[f"thigh_{side}"]
-            hip, knee, ankle = (part.mean(axis=0)[:2] @ forward for part in (thigh[:14], shin[:14], shin[-14:]))
-            assert knee > 0.5 * (hip + ankle) - 0.01, (phase, side)
-        apart = placed["foot_left"].mean(axis=0) - placed["foot_right"].mean(axis=0)
-        assert apart[:2] @ leftward == pytest.approx(2.0 * body.HIP_WIDTH, abs=0.01)
-
-
-def test_legs_alternate_and_arms_swing_against_them():
-    ahead = {name: [] for name in ("foot_left", "foot_right", "hand_left", "hand_right")}
-    for phase in PHASES:
-        placed = vertices(gait.pose(0.0, 0.0, 0.0, float(phase) * gait.STRIDE, 0.92))
-        for name, track in ahead.items():
-            track.append(placed[name][:, 0].mean())
-    tracks = {name: np.array(track) for name, track in ahead.items()}
-    half = len(PHASES) // 2
-    assert np.roll(tracks["foot_left"], half) == pytest.approx(tracks["foot_right"], abs=1e-9)
-    difference = tracks["foot_left"] - tracks["foot_right"]
-    assert np.count_nonzero(np.diff(np.sign(difference))) in (1, 2)
-    assert np.ptp(difference) > 1.0
-    for side in ("left", "right"):
-        assert np.corrcoef(tracks[f"foot_{side}"], tracks[f"hand_{side}"])[0, 1] < -0.7
-
-
-def feet(phase):
-    """World x of both feet's middles and z of their lowest points, walking along +x from the origin, (left, right)."""
-    placed = vertices(gait.pose(phase * gait.STRIDE, 0.0, 0.0, phase * gait.STRIDE, 0.92))
-    pair = [placed[name] for name in ("foot_left", "foot_right")]
-    return [part[:, 0].mean() for part in pair], [part[:, 2].min() for part in pair]
-
-
-def test_the_raised_foot_moves_forward_past_the_standing_one():
-    """The other way round would be walking backwards."""
-    ahead, height = (np.array(column) for column in zip(*(feet(float(phase)) for phase in (*PHASES, 1.0)), strict=True))
-    faster = np.diff(ahead[:, 0] - ahead[:, 1])
-    higher = (height[1:, 0] - height[1:, 1] + height[:-1, 0] - height[:-1, 1]) / 2.0
-    clearly = np.abs(higher) > 0.04
-    assert clearly.sum() > 10
-    assert np.corrcoef(faster[clearly], higher[clearly])[0, 1] > 0.7
-
-
-def test_the_standing_foot_does_not_slide():
-    """Through mid-stance the person walks 44 cm; the left foot stays within 6 cm, flat on the floor."""
-    stance = [feet(float(phase)) for phase in np.linspace(0.10, 0.42, 33)]
-    assert np.ptp([ahead[0] for ahead, _ in stance]) < 0.06
-    assert np.abs([height[0] for _, height in stance]).max() < 0.01
-
-
-def test_the_gait_is_a_smooth_function_of_the_distance_walked():
-    """One stride later everything is where it was, a stride ahead; in 5 mm of walking nothing moves by 5 cm."""
-    for phase in PHASES[::6]:
-        walked = float(phase) * gait.STRIDE
-        now, later = (vertices(gait.pose(0.0, 0.0, 0.0, walked + more, 0.9)) for more in (0.0, gait.STRIDE))
-        for name, part in later.items():
-            assert part == pytest.approx(now[name], abs=1e-9)
-    track = [vertices(gait.pose(0.0, 0.0, 0.0, 0.005 * step, 0.9)) for step in range(273)]
-    for before, after in itertools.pairwise(track):
-        for name in before:
-            assert np.abs(after[name] - before[name]).max() < 0.05, name

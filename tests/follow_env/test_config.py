@@ -67,7 +67,11 @@ def test_settings_survive_json(config):
 
 
 def test_changed_nested_settings_survive_json():
-    wanted = {"depth": {"axial_noise": 2.0, "edge_band": 2}, "box": {"min_pixels": 5}, "measurement": {"miss_share": 0.3}}
+    wanted = {
+        "depth": {"axial_noise": 2.0, "edge_band": 2},
+        "box": {"min_pixels": 5},
+        "measurement": {"miss_share": 0.3},
+    }
     sensor = sensor_config(wanted)
     assert sensor.depth == DepthConfig(axial_noise=2.0, edge_band=2)
     assert sensor.box == BoxConfig(min_pixels=5)

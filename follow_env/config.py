@@ -7,10 +7,19 @@ and names the nearest key when one is unknown.
 import dataclasses
 import difflib
 import math
+import numbers
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
 T = TypeVar("T")
+
+
+def _require(what: str, settings: Any, names: Iterable[str], above_zero: bool = False) -> None:
+    """Raise a ValueError unless each of the settings is finite and >= 0, or > 0 if `above_zero`."""
+    for name in names:
+        value = getattr(settings, name)
+        if not (math.isfinite(value) and (value > 0.0 if above_zero else value >= 0.0)):
+            raise ValueError(f"{what} {name} is {value!r}; expected a finite value {'>' if above_zero else '>='} 0")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,6 +52,11 @@ class RobotConfig:
     camera_height: float = 1.0
     hull_radius: float = 0.25
 
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.camera_forward):
+            raise ValueError(f"robot camera_forward is {self.camera_forward!r}; expected finite metres")
+        _require("robot", self, (f.name for f in dataclasses.fields(self) if f.name != "camera_forward"), True)
+
 
 @dataclasses.dataclass(frozen=True)
 class CameraConfig:
@@ -67,8 +81,10 @@ class CameraConfig:
                 raise ValueError(f"camera {name} is {value!r}; expected a whole number of pixels from 1 to 4096")
         if not 1.0 <= self.hfov_deg <= 170.0:
             raise ValueError(f"camera hfov_deg is {self.hfov_deg!r}; expected degrees from 1 to 170")
-        if not 0.0 < self.near < self.far:
-            raise ValueError(f"camera near, far are {self.near!r}, {self.far!r}; expected 0 < near < far in metres")
+        if not 0.0 < self.near < self.far < math.inf:
+            raise ValueError(
+                f"camera near, far are {self.near!r}, {self.far!r}; expected 0 < near < far in metres, finite"
+            )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,7 +97,7 @@ class DepthConfig:
         baseline: between projector and camera, m.
         min_range, max_range: depth outside is reported as 0 (no reading), m.
         edge_band: pixels at which the depth jumps by more than `edge_jump` within this distance (px) read 0.
-        edge_jump: m.
+        edge_jump: as a share of the depth, at least of 1 m.
     """
 
     axial_noise: float = 1.0
@@ -91,6 +107,14 @@ class DepthConfig:
     max_range: float = 8.0
     edge_band: int = 1
     edge_jump: float = 0.15
+
+    def __post_init__(self) -> None:
+        _require("depth", self, ("axial_noise", "disparity_step", "min_range", "edge_band", "edge_jump"))
+        _require("depth", self, ("baseline",), above_zero=True)
+        if not self.min_range < self.max_range:
+            raise ValueError(
+                f"depth min_range, max_range are {self.min_range!r}, {self.max_range!r}; expected min_range < max_range"
+            )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,6 +132,9 @@ class BoxConfig:
     size_jitter: float = 0.04
     correlation_s: float = 0.1
     min_pixels: int = 20
+
+    def __post_init__(self) -> None:
+        _require("box", self, (field.name for field in dataclasses.fields(self)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -143,9 +170,16 @@ class MeasurementConfig:
             value = getattr(self, name)
             if not 0.0 <= value < 1.0:
                 raise ValueError(f"measurement {name} is {value!r}; expected a share from 0 to below 1")
-        for name in ("bearing_noise", "distance_noise", "bearing_correlation_s", "distance_correlation_s"):
-            if not getattr(self, name) >= 0.0:
-                raise ValueError(f"measurement {name} is {getattr(self, name)!r}; expected a value >= 0")
+        _require("measurement", self, ("bearing_noise", "distance_noise", "outlier_duration_s"))
+        _require("measurement", self, ("bearing_correlation_s", "distance_correlation_s"))
+        for name in ("bearing_bias", "distance_bias"):
+            if not math.isfinite(getattr(self, name)):
+                raise ValueError(f"measurement {name} is {getattr(self, name)!r}; expected a finite value")
+        if not -math.inf < self.outlier_low <= self.outlier_high < math.inf:
+            raise ValueError(
+                f"measurement outlier_low, outlier_high are {self.outlier_low!r}, {self.outlier_high!r}; "
+                "expected finite metres, low <= high"
+            )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -180,7 +214,7 @@ def build(what: str, base: T, data: Mapping[str, Any] | None) -> T:
     """Return `base` (a settings dataclass) with the entries of `data` replaced, nested settings included.
 
     Raises:
-        ValueError: for an unknown key (names the nearest) or a value of the wrong type or not finite.
+        ValueError: for an unknown key (names the nearest) or a value of the wrong type or range.
     """
     if data is None:
         return base
@@ -193,8 +227,8 @@ def build(what: str, base: T, data: Mapping[str, Any] | None) -> T:
         if dataclasses.is_dataclass(default):
             changes[key] = build(f"{what}.{key}", default, value)
             continue
-        numeric = isinstance(value, int | float) and not isinstance(value, bool)
-        if not numeric or math.isnan(value) or (isinstance(default, int) and value != int(value)):
+        numeric = isinstance(value, numbers.Real) and not isinstance(value, bool) and not math.isnan(value)
+        if not numeric or (isinstance(default, int) and (math.isinf(value) or value != int(value))):
             raise ValueError(f"{what}.{key} is {value!r}; expected a number like the default {default!r}")
         changes[key] = type(default)(value)
     return dataclasses.replace(base, **changes)  # type: ignore[type-var]

@@ -42,12 +42,14 @@ class FollowEnv(gymnasium.Env):
     **Observation** by `obs`:
 
     - `"measurement"` float32 (8,): bearing, distance, validity (1 or 0), age of the latest measurement in s, odometry
-      v and omega, last action. Without a new measurement bearing, distance and validity are 0.
+      v and omega, last action. Without a new measurement bearing, distance and validity are 0, and the age counts on
+      from the latest one (from the start while there was none).
     - `"state"` float32 (8,): true bearing, true distance, person's velocity in the robot frame (x, y), odometry v and
       omega, last action.
     - `"rgbd"` Dict: `rgb` uint8 (H, W, 3), `depth` float32 (H, W) m (0 = no reading), `twist` float32 (2,) odometry.
     - `"rgbd_box"`: the same and `box` float32 (4,) = (u0, v0, u1, v1) px, the person's visible box with the stated
-      jitter; zeros when the person is not detected. The `mask` rung of the benchmark.
+      jitter; zeros when the person is not detected. The `mask` rung of the benchmark. With latency, the first frame
+      stands, without a box, until it is old enough.
     - `"rgbd_uint8"`: uint8 (H, W, 4), the depth as 255 (1 - z / 8 m), 0 = no reading or beyond; the metric depth
       stays in `info["depth"]`.
 
@@ -109,7 +111,8 @@ class FollowEnv(gymnasium.Env):
         self.dt = 1.0 / control_hz
         self.metadata = {**self.metadata, "render_fps": control_hz}
         self._substeps = PHYSICS_HZ // control_hz
-        self._delay = round(latency_s * control_hz) if math.isfinite(latency_s) else -1
+        numeric = isinstance(latency_s, int | float) and math.isfinite(latency_s)
+        self._delay = round(latency_s * control_hz) if numeric else -1
         if self._delay < 0 or abs(self._delay * self.dt - latency_s) > 1e-6:
             raise ValueError(
                 f"latency_s is {latency_s!r}; expected a multiple >= 0 of the control period {self.dt:.4f} s"
@@ -148,9 +151,7 @@ class FollowEnv(gymnasium.Env):
         y += float(self.np_random.uniform(-1.0, 1.0)) * self.scene.start_width
         ahead = (x + SET_POINT * math.cos(yaw), y + SET_POINT * math.sin(yaw), yaw)
         self._route = make_route(options.get("route", self._route_name), self.scene, ahead, self.np_random)
-        robot_pose = tuple(float(value) for value in options.get("robot_pose", (x, y, yaw)))
-        if len(robot_pose) != 3 or not all(map(math.isfinite, robot_pose)):
-            raise ValueError(f"robot_pose is {options['robot_pose']!r}; expected three finite numbers (x, y, yaw)")
+        robot_pose = _pose(options.get("robot_pose", (x, y, yaw)))
         self._world.reset(robot_pose, self._route.pose(0.0))
 
         self._steps = 0
@@ -205,7 +206,7 @@ class FollowEnv(gymnasium.Env):
         return observation, sum(self._rewards.values()), terminated, truncated, info
 
     def render(self) -> Any:
-        """Return what `render_mode` asks for: the dashboard (H, W, 3) uint8, or (rgb, depth) of the robot's camera."""
+        """Return the dashboard (H, W, 3) uint8, or the robot's (rgb, depth), or None in `human` mode."""
         if self.render_mode is None or self._route is None:
             raise gymnasium.error.ResetNeeded(
                 "nothing to render; make the environment with render_mode='rgb_array' and call reset() first"
@@ -213,12 +214,15 @@ class FollowEnv(gymnasium.Env):
         if self.render_mode == "rgbd_tuple":
             frame = self.frame()
             return frame.rgb, frame.depth
+        if self.render_mode == "human":
+            return None
         assert self._dashboard is not None
         return self._dashboard.image()
 
     def frame(self) -> RGBDFrame:
         """Return the camera's picture of this moment without sensor errors: the truth, for pictures and tests."""
-        assert self._route is not None
+        if self._route is None:
+            raise gymnasium.error.ResetNeeded("frame() was called before reset(); call reset() first")
         assert self._world is not None
         if self._renderer is None:
             self._renderer = make_renderer(self._renderer_name, self.scene, self.camera, self._dressed)
@@ -278,10 +282,9 @@ class FollowEnv(gymnasium.Env):
         self._queue: deque[Any] = deque()
 
     def _dress(self, clothes: str) -> None:
-        if self._renderer is not None and clothes != self._dressed:
-            self._renderer.close()
-            self._renderer = None
         self._dressed = clothes
+        if self._renderer is not None:
+            self._renderer.dress(clothes)
 
     def _look(self) -> None:
         """Update the truth: poses, bearing, distance, visibility and what is counted from them."""
@@ -321,13 +324,14 @@ class FollowEnv(gymnasium.Env):
             seen = self._delayed(
                 self._measurement.measure(self._bearing, self._distance, self._visible, self.np_random)
             )
-            age = self._delay * self.dt
             if seen is None:
                 since = 0.0 if self._last_measured is None else self._last_measured
                 return np.array((0.0, 0.0, 0.0, self.time - since, *own), np.float32)
-            self._last_measured = max(self.time - age, 0.0)
-            return np.array((seen[0], min(seen[1], MAX_DISTANCE), 1.0, age, *own), np.float32)
-        frame, box = self._delayed(self._sense())
+            age = self._delay * self.dt
+            self._last_measured = self.time - age
+            bearing = min(max(seen[0], -math.pi), math.pi)
+            return np.array((bearing, min(seen[1], MAX_DISTANCE), 1.0, age, *own), np.float32)
+        frame, box = self._delayed(self._sense()) or (self._queue[0][0], np.zeros(4, np.float32))
         self.observed = frame
         if self._obs == "rgbd_uint8":
             near = np.where((frame.depth > 0.0) & (frame.depth < 8.0), 255.0 * (1.0 - frame.depth / 8.0), 0.0)
@@ -340,7 +344,7 @@ class FollowEnv(gymnasium.Env):
     def _sense(self) -> tuple[RGBDFrame, np.ndarray]:
         """Return the frame with sensor errors, and the person's jittered box (zeros when not detected)."""
         truth = self.frame()
-        depth = self._depth_sensor.corrupt(truth.depth, self.np_random)
+        depth = np.minimum(self._depth_sensor.corrupt(truth.depth, self.np_random), np.float32(self.camera.config.far))
         errors = self._box_error.step(self.np_random)
         box = np.zeros(4, np.float32)
         tight = truth.person_box(self._box_config.min_pixels)
@@ -361,9 +365,9 @@ class FollowEnv(gymnasium.Env):
         return RGBDFrame(truth.rgb, depth, truth.ids), box
 
     def _delayed(self, value: Any) -> Any:
-        """Return what was seen `latency_s` ago (at the start: the oldest there is)."""
+        """Return what was seen `latency_s` ago, or None while that was before the start."""
         self._queue.append(value)
-        return self._queue.popleft() if len(self._queue) > self._delay else self._queue[0]
+        return self._queue.popleft() if len(self._queue) > self._delay else None
 
     def _info(self) -> dict[str, Any]:
         assert self._world is not None
@@ -402,3 +406,13 @@ class FollowEnv(gymnasium.Env):
         self._dashboard.update(info, self.observed or self.frame())
         if self.render_mode == "human":
             show_window(self._dashboard.image(), 1.0 / self.dt)
+
+
+def _pose(value: Any) -> tuple[float, float, float]:
+    try:
+        x, y, yaw = (float(number) for number in value)
+    except (TypeError, ValueError):
+        x = y = yaw = math.nan
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):
+        raise ValueError(f"robot_pose is {value!r}; expected three finite numbers (x, y, yaw)")
+    return x, y, yaw

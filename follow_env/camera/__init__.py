@@ -19,6 +19,9 @@ class Renderer(Protocol):
     def render(self, camera: CameraPose, person: list[SegmentPose]) -> RGBDFrame:
         """Return the frame that the camera sees, without sensor errors."""
 
+    def dress(self, clothes: str) -> None:
+        """Give the person these clothes, a key of `follow_env.person.body.CLOTHES`."""
+
     def close(self) -> None:
         """Free what the renderer holds; a second call does nothing."""
 

@@ -5,6 +5,8 @@ for the scene's lamps; its strength follows the lamps' falloff at the place the 
 """
 
 import math
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import pybullet
@@ -63,6 +65,11 @@ class TinyRenderer:
         ids = (np.asarray(segmentation).reshape(shape) >= self._person[0]).astype(np.uint8)
         return RGBDFrame(rgb, depth.astype(np.float32), ids)
 
+    def dress(self, clothes: str) -> None:
+        """Give the person these clothes."""
+        for body, segment in zip(self._person, segments(clothes), strict=True):
+            pybullet.changeVisualShape(body, -1, rgbaColor=(*segment.colour, 1.0), physicsClientId=self._client)
+
     def close(self) -> None:
         """Disconnect from PyBullet; a second call does nothing."""
         if self._client >= 0:
@@ -100,14 +107,18 @@ class TinyRenderer:
         )
 
     def _add_mesh(self, vertices: np.ndarray, normals: np.ndarray, indices: np.ndarray, material: Material) -> int:
-        shape = pybullet.createVisualShape(
-            pybullet.GEOM_MESH,
-            vertices=vertices.tolist(),
-            indices=indices.tolist(),
-            normals=normals.tolist(),
-            uvs=np.zeros((len(vertices), 2)).tolist(),
-            rgbaColor=(*material.colour, 1.0),
-            specularColor=(0.0, 0.0, 0.0),
-            physicsClientId=self._client,
-        )
-        return pybullet.createMultiBody(0, -1, shape, physicsClientId=self._client)
+        """Add a mesh by way of an OBJ file: PyBullet loses the memory of meshes that are handed over as lists."""
+        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+        lines += [f"vn {x!r} {y!r} {z!r}" for x, y, z in normals.tolist()]
+        lines += ["vt 0 0", *(f"f {a}/1/{a} {b}/1/{b} {c}/1/{c}" for a, b, c in (indices.reshape(-1, 3) + 1).tolist())]
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "segment.obj")
+            path.write_text("\n".join(lines) + "\n", encoding="ascii")
+            shape = pybullet.createVisualShape(
+                pybullet.GEOM_MESH,
+                fileName=str(path),
+                rgbaColor=(*material.colour, 1.0),
+                specularColor=(0.0, 0.0, 0.0),
+                physicsClientId=self._client,
+            )
+            return pybullet.createMultiBody(0, -1, shape, physicsClientId=self._client)

@@ -10,7 +10,8 @@ import numpy as np
 
 Colour = tuple[float, float, float]
 
-THIGH, SHIN, ANKLE_HEIGHT = 0.42, 0.42, 0.08
+THIGH, SHIN, FOOT = 0.42, 0.42, 0.26
+FOOT_PROFILE = ((0.0, 0.03, 0.02), (0.06, 0.04, 0.035), (0.5, 0.048, 0.04), (0.9, 0.042, 0.028), (1.0, 0.02, 0.015))
 HIP_WIDTH, SHOULDER_WIDTH = 0.09, 0.20
 TRUNK, UPPER_ARM, FOREARM = 0.50, 0.29, 0.26
 
@@ -94,13 +95,12 @@ def segments(clothes: str = "blue") -> tuple[Segment, ...]:
         (1.0, 0.03, 0.05),
     )
     hair = ((-0.10, 0.03, 0.03), (0.05, 0.068, 0.080), (0.35, 0.084, 0.104), (0.70, 0.082, 0.100), (0.95, 0.05, 0.06))
-    foot = ((0.0, 0.03, 0.02), (0.06, 0.04, 0.035), (0.5, 0.048, 0.04), (0.9, 0.042, 0.028), (1.0, 0.02, 0.015))
     pair = []
     for side in ("left", "right"):
         pair += [
             _limb(f"thigh_{side}", THIGH, 0.088, 0.058, trousers),
             _limb(f"shin_{side}", SHIN, 0.060, 0.042, trousers),
-            Segment(f"foot_{side}", 0.26, foot, SHOE),
+            Segment(f"foot_{side}", FOOT, FOOT_PROFILE, SHOE),
             _limb(f"upper_arm_{side}", UPPER_ARM, 0.052, 0.042, shirt),
             _limb(f"forearm_{side}", FOREARM, 0.042, 0.030, shirt),
             Segment(f"hand_{side}", 0.17, ((0.0, 0.02, 0.025), (0.4, 0.022, 0.045), (1.0, 0.012, 0.025)), SKIN),

@@ -8,7 +8,8 @@ standing person stands. The pelvis rides at the height that puts the lower foot 
 import math
 
 from follow_env.person.body import (
-    ANKLE_HEIGHT,
+    FOOT,
+    FOOT_PROFILE,
     FOREARM,
     HIP_WIDTH,
     SHIN,
@@ -35,8 +36,14 @@ def leg_angles(phase: float, amplitude: float) -> tuple[float, float, float]:
     """Return hip flexion, knee flexion and foot pitch (toes up) in rad; phase 0 is that leg's heel strike."""
     hip = math.radians(8.0 + 21.0 * math.cos(2.0 * math.pi * (phase - 0.97)))
     knee = math.radians(4.0 + 13.0 * _bump(phase, 0.14, 0.14) + 56.0 * _bump(phase, 0.73, 0.26))
-    foot = math.radians(17.0 * _bump(phase, 0.98, 0.12) - 35.0 * _bump(phase, 0.64, 0.22))
+    foot = math.radians(17.0 * _bump(phase, 0.98, 0.12) - 30.0 * _bump(phase, 0.66, 0.22))
     return amplitude * hip, amplitude * knee, amplitude * foot
+
+
+def _drop(foot: float) -> float:
+    """Depth of the foot's lowest point below the ankle at this pitch, m: the toes' when it points down."""
+    sine, cosine = math.sin(foot), math.cos(foot)
+    return max(0.04 + (0.06 - FOOT * share) * sine + depth * cosine for share, _, depth in FOOT_PROFILE)
 
 
 def pose(x: float, y: float, heading: float, walked: float, speed: float) -> list[SegmentPose]:
@@ -52,7 +59,7 @@ def pose(x: float, y: float, heading: float, walked: float, speed: float) -> lis
     amplitude = min(1.0, speed / FULL_SPEED)
     cycle = walked / STRIDE
     legs = [leg_angles((cycle + shift) % 1.0, amplitude) for shift in (0.0, 0.5)]
-    pelvis = ANKLE_HEIGHT + max(THIGH * math.cos(hip) + SHIN * math.cos(hip - knee) for hip, knee, _ in legs)
+    pelvis = max(THIGH * math.cos(hip) + SHIN * math.cos(hip - knee) + _drop(foot) for hip, knee, foot in legs)
     cosine, sine = math.cos(heading), math.sin(heading)
     half_c, half_s = math.cos(0.5 * heading), math.sin(0.5 * heading)
 

@@ -29,7 +29,10 @@ def test_the_state_observation_is_the_truth(make, chase):
 @pytest.mark.parametrize("obs", ["measurement", "rgbd_box", "rgbd_uint8"])
 @pytest.mark.parametrize("steps", [1, 4])
 def test_latency_delays_what_is_seen_by_exactly_so_many_steps(make, equal, episode, obs, steps):
-    """Against a twin without latency that drives the same way; odometry and the last action are not delayed."""
+    """Against a twin without latency that drives the same way; odometry and the last action are not delayed.
+
+    Before anything is old enough there is no measurement and no box, and the first frame stands.
+    """
     latency = steps / 30.0
     now, late = make(INDOOR, obs=obs), make(INDOOR, obs=obs, latency_s=latency)
     one, two = episode(now, 3, steps=25), episode(late, 3, steps=25)
@@ -37,32 +40,31 @@ def test_latency_delays_what_is_seen_by_exactly_so_many_steps(make, equal, episo
         past = one[max(k - steps, 0)][0]
         seen, current = delayed[0], prompt[0]
         if obs == "measurement":
-            assert equal(seen[:3], past[:3]), k
+            assert equal(seen[:3], past[:3] if k >= steps else np.zeros(3, np.float32)), k
             assert equal(seen[4:], current[4:]), k
         elif obs == "rgbd_uint8":
             assert equal(seen, past), k
             assert equal(delayed[-1]["depth"], one[max(k - steps, 0)][-1]["depth"]), k
         else:
-            assert equal({**seen, "twist": None}, {**past, "twist": None}), k
+            box = past["box"] if k >= steps else np.zeros(4, np.float32)
+            assert equal({**seen, "twist": None}, {**past, "twist": None, "box": box}), k
             assert equal(seen["twist"], current["twist"]), k
         assert equal({**delayed[-1], "depth": None}, {**prompt[-1], "depth": None}), "the truth is never delayed"
 
 
 def test_the_age_of_a_measurement_is_the_time_since_it_was_taken(make, episode):
-    """With latency and misses: a valid one is as old as the latency, or as the episode when that is younger."""
+    """With latency and misses: a valid one is as old as the latency; before the first, the age is the episode's."""
     latency = 0.1
     env = make(latency_s=latency, sensor={"measurement": {"miss_share": 0.5}}, route="standing")
     twin = make(sensor={"measurement": {"miss_share": 0.5}}, route="standing")
     for seed in range(4):
         late, prompt = (episode(e, seed, policy=lambda info: STOP, steps=60) for e in (env, twin))
-        taken = None
+        taken = 0
         for k, (delayed, _) in enumerate(zip(late, prompt, strict=True)):
-            source = max(k - 3, 0)
-            if prompt[source][0][2]:
-                taken = source
-                assert delayed[0][2] == 1.0
-            if taken is not None:
-                assert delayed[0][3] == pytest.approx((k - taken) / 30.0, abs=1e-6), (seed, k)
+            valid = k >= 3 and bool(prompt[k - 3][0][2])
+            taken = k - 3 if valid else taken
+            assert delayed[0][2] == valid
+            assert delayed[0][3] == pytest.approx((k - taken) / 30.0, abs=1e-6), (seed, k)
 
 
 def test_the_box_is_the_persons_box_with_the_stated_jitter(make):

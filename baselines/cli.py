@@ -31,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _reproduce(parsed: argparse.Namespace) -> int:
-    from baselines.benchmark import calibration
+    from baselines import calibration
     from baselines.benchmark.configuration import Plan
     from baselines.benchmark.episodes import Player
     from baselines.benchmark.pool import EpisodeError
@@ -68,10 +68,11 @@ def _watch(parsed: argparse.Namespace) -> int:
 
 
 def _calibrate(parsed: argparse.Namespace) -> int:
-    from baselines.benchmark import calibrate
+    from baselines.benchmark import calibrate, calibration_report
 
-    calibrate.main(parsed.out, parsed.jobs)
-    print(f"The calibration is {parsed.out}.")
+    content = calibrate.main(parsed.out, parsed.jobs)
+    print(calibration_report.summary(content))
+    print(f"\nThe calibration is {parsed.out}.")
     return 0
 
 
@@ -149,7 +150,7 @@ def _add_watch(commands: _Commands) -> None:
 
 def _add_calibrate(commands: _Commands) -> None:
     calibrate = commands.add_parser("calibrate", help="measure the sensor's shape and fit its scale again")
-    shipped = Path(__file__).parent / "benchmark" / "calibration.json"
+    shipped = Path(__file__).parent / "calibration.json"
     calibrate.add_argument(
         "--out", type=_output_file, default=shipped, metavar="FILE", help="default: the file that the package ships"
     )

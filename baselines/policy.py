@@ -12,6 +12,7 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
+from baselines.calibration import NoiseModel, Pair, noise_model
 from baselines.controllers import Controller
 from baselines.controllers.pi import PIController
 from follow_env.config import CameraConfig, RobotConfig, choose
@@ -26,7 +27,6 @@ from tracker.filters import (
 from tracker.geometry import Intrinsics
 from tracker.sampling import Rule, measure
 
-Pair = tuple[float, float]
 Percept = tuple[Pair | None, Pair]
 """A measurement (bearing rad, distance m) or None, and the odometry twist (v m/s, omega rad/s)."""
 
@@ -65,21 +65,6 @@ class FollowerState:
     controller: Controller
     measurement: Pair | None = None
     estimate: Estimate | None = None
-
-
-@dataclass(frozen=True)
-class NoiseModel:
-    """Noise settings of the Kalman filters at one control rate; pairs are (bearing, distance).
-
-    Attributes:
-        measurement: R, variances in (rad^2, m^2).
-        process: Q per control step, variances in (rad^2, m^2).
-        acceleration: spectral densities of the augmented filter, (rad^2/s^3, m^2/s^3).
-    """
-
-    measurement: Pair
-    process: Pair
-    acceleration: Pair
 
 
 class Follower:
@@ -225,8 +210,6 @@ def make_follower(
         sensor: whose calibrated noise is taken; for `mask` also the rule by which depth is read from the box.
         camera: of the `rgbd_box` observation that `mask` reads; by default the environment's default camera.
     """
-    from baselines.benchmark.calibration import noise_model
-
     choose("controller", controller, CONTROLLERS)
     choose("perception", perception, OBSERVATION_OF)
     sensor = sensor or SENSORS[perception]

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from baselines.benchmark.calibration import environment_kwargs, follower
+from baselines.benchmark.assembly import environment_kwargs, follower
 from baselines.benchmark.cells import Cell
 from follow_env.env import FollowEnv
 from follow_env.view import Dashboard

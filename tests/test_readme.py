@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from baselines.benchmark import calibration, calibration_report
+from baselines import calibration
+from baselines.benchmark import calibration_report
 from baselines.cli import _parser
 
 ROOT = Path(__file__).parents[1]

@@ -16,6 +16,7 @@ import itertools
 import json
 import math
 import statistics
+import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -23,12 +24,13 @@ from typing import Any, cast
 
 import numpy as np
 
-from baselines.benchmark.calibration import CAMERA
+from baselines.benchmark.assembly import CAMERA
 from baselines.benchmark.cells import DEPTH_RULES, SCENES
-from baselines.policy import Follower, NoiseModel, make_estimator, make_perception, perceive_measurement, perceive_state
+from baselines.calibration import NoiseModel
+from baselines.policy import Follower, make_estimator, make_perception, perceive_measurement, perceive_state
 from follow_env.config import CameraConfig, MeasurementConfig
 from follow_env.env import FollowEnv
-from tracker.filters import NoFilter
+from tracker.filters import LockOutWarning, NoFilter
 from tracker.sampling import RULES, Rule
 
 DT = 1.0 / 30.0
@@ -47,8 +49,8 @@ TRUTH_NOISE = MeasurementConfig(bearing_noise=1e-3, distance_noise=1e-2)
 Samples = list[tuple[float, float] | None]
 
 
-def main(out: Path, jobs: int = 1) -> None:
-    """Measure, fit and write the calibration to `out` (JSON)."""
+def main(out: Path, jobs: int = 1) -> dict[str, Any]:
+    """Measure and fit, write the calibration to `out` (JSON) and return its content."""
     seeds = range(FIRST_SEED, FIRST_SEED + FRAME_EPISODES)
     with ProcessPoolExecutor(jobs) as pool:
         frames = {scene: _summarise(list(pool.map(_frame_errors, [scene] * len(seeds), seeds))) for scene in SCENES}
@@ -64,7 +66,7 @@ def main(out: Path, jobs: int = 1) -> None:
             (scene, MeasurementConfig(**by_scene[scene]), motion) for by_scene in wanted.values() for scene in SCENES
         ]
         noise = iter(list(pool.map(_noise_by_rule, *zip(*tasks, strict=True))))
-    content = {
+    content: dict[str, Any] = {
         "how": {
             "seeds": [seeds.start, seeds.stop],
             "camera": CAMERA,
@@ -79,7 +81,9 @@ def main(out: Path, jobs: int = 1) -> None:
         "sensors": sensors,
         "noise": {name: {scene: next(noise) for scene in SCENES} for name in wanted},
     }
-    out.write_text(json.dumps(_rounded(content), indent=1) + "\n", encoding="utf-8")
+    text = json.dumps(_rounded(content), indent=1) + "\n"
+    out.write_text(text, encoding="utf-8")
+    return dict(json.loads(text))
 
 
 def _truth_driver() -> Follower:
@@ -297,7 +301,9 @@ def _inflated_shares(env: FollowEnv, estimator: str, noise: NoiseModel) -> list[
         observation, _ = env.reset(seed=seed)
         state, ended = None, False
         while not ended:
-            action, state = policy.predict(observation, state)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", LockOutWarning)  # what is looked for here
+                action, state = policy.predict(observation, state)
             steps += 1
             for axis in (0, 1):
                 inflated[axis] += state.estimate is not None and state.estimate.action[axis] == "inflate"

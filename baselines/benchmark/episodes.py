@@ -90,7 +90,7 @@ class Player:
 
     def __call__(self, cell: Cell, seed: int) -> Episode:
         """Play the episode of this cell and seed; what was played before does not change it."""
-        from baselines.benchmark.calibration import environment, environment_key, follower
+        from baselines.benchmark.assembly import environment, environment_key, follower
 
         key = environment_key(cell)
         if self._env is None or key != self._key:

@@ -19,7 +19,8 @@ from baselines.benchmark.cells import Cell
 from baselines.benchmark.configuration import Plan
 from baselines.benchmark.episodes import Episode, play
 from baselines.benchmark.reproduce import reproduce
-from baselines.policy import Follower, NoiseModel, make_estimator, perceive_measurement
+from baselines.calibration import NoiseModel
+from baselines.policy import Follower, make_estimator, perceive_measurement
 
 DT = 1.0 / 30.0
 SENSORS = ("clean", "heavy_tails")

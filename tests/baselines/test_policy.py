@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import follow_env
-from baselines.policy import Follower, NoiseModel, make_follower, make_perception, perceive_measurement
+from baselines.calibration import NoiseModel
+from baselines.policy import Follower, make_follower, make_perception, perceive_measurement
 from tracker.filters import NoFilter
 
 NOISE = NoiseModel((1e-4, 1e-2), (1e-4, 1e-3), (1e-2, 1e-1))

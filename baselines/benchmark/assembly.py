@@ -1,0 +1,57 @@
+"""From a cell of the benchmark to its environment and its follower."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Hashable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from baselines.benchmark.cells import Cell
+from baselines.calibration import NoiseModel, noise_model, sensor
+from baselines.policy import OBSERVATION_OF, Follower, make_follower
+from follow_env.config import CameraConfig
+
+if TYPE_CHECKING:
+    import gymnasium
+
+CAMERA = {"width": 160, "height": 120}
+"""Picture of the `mask` rung, px."""
+
+
+def environment_kwargs(cell: Cell, camera: Mapping[str, int] = CAMERA) -> dict[str, Any]:
+    """Return what `FollowEnv` is made with for a cell; `camera` is for the `mask` rung."""
+    kwargs: dict[str, Any] = {"scene": cell.scene, "obs": OBSERVATION_OF[cell.perception]}
+    if cell.perception == "emulated":
+        kwargs["sensor"] = {"measurement": sensor(cell.sensor, cell.scene)}
+    if cell.perception == "mask":
+        kwargs["camera"] = dict(camera)
+    return kwargs
+
+
+def environment_key(cell: Cell) -> Hashable:
+    """Cells with equal keys share an environment."""
+    return json.dumps(environment_kwargs(cell), sort_keys=True)
+
+
+def environment(cell: Cell) -> gymnasium.Env:
+    """Return the environment of a cell."""
+    from follow_env.env import FollowEnv
+
+    return FollowEnv(**environment_kwargs(cell))
+
+
+def follower(cell: Cell, camera: Mapping[str, int] = CAMERA) -> Follower:
+    """Return the follower of a cell; `camera` is that of its environment."""
+    noise = noise_model(cell.perception, cell.scene, cell.sensor)
+    q_bearing, q_distance = noise.process
+    scaled = NoiseModel(noise.measurement, (cell.q_scale * q_bearing, cell.q_scale * q_distance), noise.acceleration)
+    return make_follower(
+        cell.estimator,
+        cell.perception,
+        cell.scene,
+        cell.controller,
+        scaled,
+        cell.alpha,
+        cell.sensor,
+        CameraConfig(**camera),
+    )

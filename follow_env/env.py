@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from follow_env.camera import CameraPose, PinholeCamera, Renderer, RGBDFrame, make_renderer
+from follow_env.camera import RENDERERS, CameraPose, PinholeCamera, Renderer, RGBDFrame, make_renderer
 from follow_env.camera.depth import DepthSensor
 from follow_env.config import CameraConfig, RobotConfig, SensorConfig, build, choose, sensor_config
 from follow_env.measurement import GaussMarkov, MeasurementModel
@@ -23,9 +23,15 @@ from follow_env.view import Dashboard, import_pygame, show_window
 
 OBSERVATIONS = ("measurement", "state", "rgbd", "rgbd_box", "rgbd_uint8")
 ACTIONS = ("twist", "wheels")
+SETTINGS = (
+    *("scene", "obs", "action", "route", "sensor", "camera", "robot", "renderer", "control_hz", "latency_s"),
+    *("person", "render_mode"),
+)
 MAX_DISTANCE = 20.0
 LOST_AFTER = 5.0
 """The episode ends when the person was out of view for longer than this, s."""
+HALF_TRUNK = 0.16
+"""The person counts as visible while any of the trunk, this far to either side of its axis, is in view, m."""
 BAND = (1.0, 2.0, math.radians(30.0))
 """In band: distance between the first two (m) and |bearing| up to the third (rad)."""
 
@@ -92,8 +98,16 @@ class FollowEnv(gymnasium.Env):
         latency_s: float = 0.0,
         person: str = "blue",
         render_mode: str | None = None,
+        **unknown: Any,
     ) -> None:
-        if not isinstance(control_hz, int) or control_hz <= 0 or PHYSICS_HZ % control_hz:
+        for name in unknown:
+            choose("FollowEnv setting", name, SETTINGS)
+        if (
+            not isinstance(control_hz, int)
+            or isinstance(control_hz, bool)
+            or control_hz <= 0
+            or PHYSICS_HZ % control_hz
+        ):
             raise ValueError(
                 f"control_hz is {control_hz!r}; expected a whole number that divides the physics rate {PHYSICS_HZ}, "
                 "for example 30"
@@ -101,7 +115,7 @@ class FollowEnv(gymnasium.Env):
         self._obs = choose("obs", obs, OBSERVATIONS)
         self._action = choose("action", action, ACTIONS)
         self._route_name = choose("route", route, ROUTES)
-        self._renderer_name = choose("renderer", renderer, ("tiny",))
+        self._renderer_name = choose("renderer", renderer, RENDERERS)
         self._person = choose("person", person, CLOTHES)
         self.render_mode = (
             None if render_mode is None else choose("render_mode", render_mode, self.metadata["render_modes"])
@@ -300,16 +314,24 @@ class FollowEnv(gymnasium.Env):
         self._distance, left = cosine * dx + sine * dy, -sine * dx + cosine * dy
         self._bearing = math.atan2(left, self._distance)
         self._surface_distance = max(math.sqrt(dx * dx + dy * dy) - self.robot_config.hull_radius - PERSON_RADIUS, 0.0)
-        depth = self._distance - self.robot_config.camera_forward
-        in_field = depth > 0.3 and abs(left) <= depth * math.tan(0.5 * self.camera.hfov)
-        eye = self.camera_pose()
-        self._visible = in_field and self._world.line_of_sight(
-            (eye.x, eye.y, eye.z), (self._person_pose[0], self._person_pose[1], 1.2)
-        )
+        self._visible = self._in_view(self._distance - self.robot_config.camera_forward, left)
         self._out_of_view = 0 if self._visible else self._out_of_view + 1
         self._longest_out_of_view = max(self._longest_out_of_view, self._out_of_view)
         low, high, width = BAND
         self._in_band += low <= self._distance <= high and abs(self._bearing) <= width
+
+    def _in_view(self, depth: float, left: float) -> bool:
+        """Whether any of the trunk (axis, left or right side) is in the camera's field with a free line of sight."""
+        assert self._world is not None
+        eye = self.camera_pose()
+        reach = depth * math.tan(0.5 * self.camera.hfov)
+        x, y, _ = self._person_pose
+        for offset in (0.0, HALF_TRUNK, -HALF_TRUNK):
+            if depth > 0.3 and abs(left + offset) <= reach:
+                point = (x - offset * math.sin(eye.yaw), y + offset * math.cos(eye.yaw), 1.2)
+                if self._world.line_of_sight((eye.x, eye.y, eye.z), point):
+                    return True
+        return False
 
     def _observe(self) -> Any:
         """Return the observation, `latency_s` old in what was seen, current in odometry and action."""

@@ -28,10 +28,6 @@ class GaussMarkov:
         self._values = [0.0] * size
         self._started = False
 
-    def reset(self) -> None:
-        """Forget the past: the next values come from the stationary distribution."""
-        self._started = False
-
     def step(self, rng: np.random.Generator) -> list[float]:
         """Return the next values (a list of `size` floats)."""
         draws = [float(d) for d in rng.standard_normal(len(self._values))]
@@ -57,12 +53,6 @@ class MeasurementModel:
         self._renew = dt / run if run > dt else 1.0
         self._outlier = 0.0
         self._started = False
-
-    def reset(self) -> None:
-        """Start a new episode."""
-        self._bearing_error.reset()
-        self._distance_error.reset()
-        self._outlier, self._started = 0.0, False
 
     def measure(
         self, bearing: float, distance: float, visible: bool, rng: np.random.Generator

@@ -26,6 +26,7 @@ import numpy as np
 
 from baselines.benchmark.assembly import CAMERA
 from baselines.benchmark.cells import DEPTH_RULES, SCENES
+from baselines.benchmark.table1 import PAPER_RMSE
 from baselines.calibration import NoiseModel
 from baselines.policy import Follower, make_estimator, make_perception, perceive_measurement, perceive_state
 from follow_env.config import CameraConfig, MeasurementConfig
@@ -42,11 +43,16 @@ OUTLIER = (0.1, 0.3)
 WALKING_SPEED = 12.0 / 14.0
 SHAPE_RULE = "grid_mean"
 """Mean over the box: the reading of "z_c is measured by the camera" that lets the background in (paper B, (25))."""
-PAPER_NO_FILTER = {"corridor": (0.0141, 0.1531906), "indoor": (0.0173, 0.462580)}
+PAPER_NO_FILTER = {
+    scene: (PAPER_RMSE[scene, "angle", "none"], PAPER_RMSE[scene, "distance", "none"] / 100.0) for scene in SCENES
+}
 """Table 1's No filter row, rad and m."""
 TRUTH_NOISE = MeasurementConfig(bearing_noise=1e-3, distance_noise=1e-2)
 
-Samples = list[tuple[float, float] | None]
+FAR_FROM = 1.7
+"""Outlier shares are also told apart by the true distance, nearer and farther than this, m."""
+Samples = list[tuple[float, float, float] | None]
+"""Errors of bearing (rad) and distance (m), and the true distance (m); None = miss."""
 
 
 def main(out: Path, jobs: int = 1) -> dict[str, Any]:
@@ -74,6 +80,7 @@ def main(out: Path, jobs: int = 1) -> dict[str, Any]:
             "alpha": ALPHA,
             "control_hz": round(1.0 / DT),
             "outlier_thresholds_rad_m": OUTLIER,
+            "far_from_m": FAR_FROM,
             "paper_no_filter_rad_m": PAPER_NO_FILTER,
         },
         "frames": frames,
@@ -95,7 +102,7 @@ def _truth_observation(info: dict[str, Any]) -> np.ndarray:
 
 
 def _frame_errors(scene: str, seed: int) -> dict[str, Samples]:
-    """Play an episode by the truth; return the errors (rad, m) of each depth rule on its frames, None = miss."""
+    """Play an episode by the truth; return the errors of each depth rule on its frames."""
     env, driver, state = FollowEnv(scene, obs="rgbd_box", camera=CAMERA), _truth_driver(), None
     rules = {rule: make_perception("mask", CameraConfig(**CAMERA), rule=cast(Rule, rule)) for rule in RULES}
     errors: dict[str, Samples] = {rule: [] for rule in rules}
@@ -105,7 +112,9 @@ def _frame_errors(scene: str, seed: int) -> dict[str, Samples]:
         for rule, perceive in rules.items():
             measurement, _ = perceive(observation)
             errors[rule].append(
-                None if measurement is None else (measurement[0] - info["bearing"], measurement[1] - info["distance"])
+                None
+                if measurement is None
+                else (measurement[0] - info["bearing"], measurement[1] - info["distance"], info["distance"])
             )
         action, state = driver.predict(_truth_observation(info), state)
         observation, _, terminated, truncated, info = env.step(action)
@@ -145,6 +154,14 @@ def _summarise(episodes: Sequence[dict[str, Samples]]) -> dict[str, dict[str, An
                 "outlier_low": beyond[len(beyond) // 20] if beyond else 0.0,
                 "outlier_high": beyond[-1 - len(beyond) // 20] if beyond else 0.0,
             }
+            for side, farther in (("nearer", False), ("farther", True)):
+                flags = [
+                    abs(error[axis] - middle) > OUTLIER[axis]
+                    for episode in found
+                    for error in episode
+                    if (error[2] > FAR_FROM) == farther
+                ]
+                entry[name][f"{side}_outlier_share"] = sum(flags) / len(flags)
         summary[rule] = entry
     return summary
 

@@ -11,7 +11,8 @@ def summary(calibration: dict[str, Any]) -> str:
     """Return measured errors, fitted sensors and filter noise as three Markdown tables."""
     return "\n\n".join(
         (
-            "Errors of each depth rule on rendered frames (bias and spread without outliers):",
+            "Errors of each depth rule on rendered frames (bias and spread without outliers; outlier shares of all frames, "
+            f"and of those with the person nearer and farther than {calibration['how']['far_from_m']} m):",
             _frames(calibration),
             "Emulated sensors, scaled to the paper's No filter row:",
             _sensors(calibration),
@@ -23,7 +24,7 @@ def summary(calibration: dict[str, Any]) -> str:
 
 def _frames(calibration: dict[str, Any]) -> str:
     header = ["scene", "depth rule", "missed", "angle RMSE (rad)", "angle bias", "distance RMSE (cm)", "bias", "spread"]
-    header += ["outliers", "outlier size (cm)", "mean run (s)"]
+    header += ["outliers", "nearer", "farther", "outlier size (cm)", "mean run (s)"]
     rows = []
     for scene, rules in calibration["frames"].items():
         for rule, entry in rules.items():
@@ -38,7 +39,10 @@ def _frames(calibration: dict[str, Any]) -> str:
                     f"{bearing['rmse']:.4f}",
                     f"{bearing['bias']:.4f}",
                     *(f"{100.0 * distance[key]:.1f}" for key in ("rmse", "bias", "spread")),
-                    f"{distance['outlier_share']:.1%}",
+                    *(
+                        f"{distance[key]:.1%}"
+                        for key in ("outlier_share", "nearer_outlier_share", "farther_outlier_share")
+                    ),
                     f"{sizes[0]:.0f} to {sizes[1]:.0f}" if found else "–",
                     f"{distance['outlier_duration_s']:.2f}" if found else "–",
                 ]

@@ -8,7 +8,7 @@ from follow_env.config import choose
 from follow_env.person.gait import SegmentPose
 from follow_env.scene import Scene
 
-__all__ = ["CameraPose", "PinholeCamera", "RGBDFrame", "Renderer", "make_renderer"]
+__all__ = ["RENDERERS", "CameraPose", "PinholeCamera", "RGBDFrame", "Renderer", "make_renderer"]
 
 RENDERERS = ("tiny",)
 

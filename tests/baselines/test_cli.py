@@ -163,12 +163,12 @@ def test_a_terminal_shows_a_bar(tmp_path: Path) -> None:
 def test_watch_and_calibrate_get_what_was_asked_for(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from baselines import watch
+    from baselines import calibration, watch
     from baselines.benchmark import calibrate
 
     asked: list[object] = []
     monkeypatch.setattr(watch, "watch", lambda *arguments: asked.append(arguments) or "a summary")
-    monkeypatch.setattr(calibrate, "main", lambda *arguments: asked.append(arguments))
+    monkeypatch.setattr(calibrate, "main", lambda *arguments: asked.append(arguments) or calibration.settings())
     video, constants = tmp_path / "film.mp4", tmp_path / "constants.json"
     words = ["--estimator", "kf", "--perception", "truth", "--scene", "indoor", "--seed", "3", "--video", str(video)]
     assert cli.main(["watch", *words]) == 0

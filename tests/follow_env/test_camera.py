@@ -238,7 +238,7 @@ def test_the_picture_follows_the_motion():
 
 @pytest.mark.parametrize("name", ["corridor", "indoor"])
 def test_visible_agrees_with_the_picture(name):
-    """From random places: who is `visible` has pixels, and who has no pixels is not `visible`."""
+    """From random places: who is `visible` has pixels, who is not has next to none."""
     env = gymnasium.make(
         follow_env.IDS[name], obs="rgbd", route="standing", camera={"width": 64, "height": 48}
     ).unwrapped
@@ -250,7 +250,7 @@ def test_visible_agrees_with_the_picture(name):
         seen.append(info["visible"])
         if info["visible"]:
             assert pixels > 0, (seed, place)
-        if pixels == 0:
-            assert not info["visible"], (seed, place)
+        elif info["distance"] > 0.5:
+            assert pixels < 60, (seed, place)
     env.close()
     assert 5 < sum(seen) < 55

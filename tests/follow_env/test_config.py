@@ -214,8 +214,16 @@ def test_a_latency_that_is_no_number_is_a_clear_error(latency):
 
 
 def test_an_unknown_keyword_is_named():
-    message = refusal(TypeError, gymnasium.make, follow_env.IDS["corridor"], latncy_s=0.1)
-    assert "'latncy_s'" in message
+    message = refusal(ValueError, gymnasium.make, follow_env.IDS["corridor"], latncy_s=0.1)
+    assert "did you mean 'latency_s'" in message
+
+
+def test_every_setting_is_offered_when_one_is_unknown():
+    import inspect
+
+    from follow_env.env import SETTINGS, FollowEnv
+
+    assert (*inspect.signature(FollowEnv).parameters,) == (*SETTINGS, "unknown")
 
 
 @pytest.mark.filterwarnings("ignore:.*is not in the possible render_modes.*")  # Gymnasium's, before ours

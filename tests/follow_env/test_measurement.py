@@ -60,21 +60,6 @@ def test_the_time_constant_is_in_seconds_at_every_rate():
         assert (record[0] * record[-1]).mean() == pytest.approx(math.exp(-1.0), abs=0.06), rate
 
 
-def test_after_a_reset_errors_start_anew():
-    for make in (lambda: GaussMarkov(3, 0.4, DT), lambda: MeasurementModel(MeasurementConfig(outlier_share=0.4), DT)):
-        used, fresh = make(), make()
-
-        def step(model, rng):
-            return model.step(rng) if isinstance(model, GaussMarkov) else model.measure(0.1, 2.0, True, rng)
-
-        warm_up = np.random.default_rng(5)
-        for _ in range(50):
-            step(used, warm_up)
-        used.reset()
-        one, two = np.random.default_rng(6), np.random.default_rng(6)
-        assert [step(used, one) for _ in range(50)] == [step(fresh, two) for _ in range(50)]
-
-
 def test_regular_errors_have_the_stated_bias_and_spread():
     config = MeasurementConfig(
         bearing_bias=0.02, bearing_noise=0.015, bearing_correlation_s=0.0, distance_correlation_s=0.0,

@@ -70,7 +70,11 @@ def _watch(parsed: argparse.Namespace) -> int:
 def _calibrate(parsed: argparse.Namespace) -> int:
     from baselines.benchmark import calibrate, calibration_report
 
-    content = calibrate.main(parsed.out, parsed.jobs)
+    try:
+        content = calibrate.main(parsed.out, parsed.jobs)
+    except OSError as error:
+        print(f"follow: {parsed.out} cannot be written ({error.strerror}); name another with --out", file=sys.stderr)
+        return BAD_INPUT
     print(calibration_report.summary(content))
     print(f"\nThe calibration is {parsed.out}.")
     return 0
@@ -152,7 +156,11 @@ def _add_calibrate(commands: _Commands) -> None:
     calibrate = commands.add_parser("calibrate", help="measure the sensor's shape and fit its scale again")
     shipped = Path(__file__).parent / "calibration.json"
     calibrate.add_argument(
-        "--out", type=_output_file, default=shipped, metavar="FILE", help="default: the file that the package ships"
+        "--out",
+        type=_output_file,
+        default=str(shipped),
+        metavar="FILE",
+        help="default: the shipped file",
     )
     _add_jobs(calibrate)
     calibrate.set_defaults(run=_calibrate)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, cast
 
 import numpy as np
@@ -34,7 +34,7 @@ OBSERVATION_OF = {"truth": "state", "emulated": "measurement", "mask": "rgbd_box
 """Perception -> the environment's observation mode that it reads."""
 ESTIMATORS = ("none", "kf", "akf", "akf_cv")
 CONTROLLERS = ("pi",)
-SENSORS = {"truth": "exact", "emulated": "default", "mask": "six_smallest"}
+DEFAULT_SENSOR = {"truth": "exact", "emulated": "default", "mask": "six_smallest"}
 """Sensor that a follower expects unless told otherwise: that of the environments, or the rule that reads the depth."""
 
 
@@ -197,6 +197,8 @@ def make_follower(
     alpha: float = 0.05,
     sensor: str | None = None,
     camera: CameraConfig | None = None,
+    robot: RobotConfig | None = None,
+    control_hz: int = 30,
 ) -> Follower:
     """Return paper B's follower, or a variant of it.
 
@@ -209,16 +211,20 @@ def make_follower(
         alpha: significance of the adaptive test.
         sensor: whose calibrated noise is taken; for `mask` also the rule by which depth is read from the box.
         camera: of the `rgbd_box` observation that `mask` reads; by default the environment's default camera.
+        robot: of the environment; scales the action.
+        control_hz: of the environment. Q per step is calibrated at 30 Hz and scales with the square of the period.
     """
     choose("controller", controller, CONTROLLERS)
     choose("perception", perception, OBSERVATION_OF)
-    sensor = sensor or SENSORS[perception]
+    sensor = sensor or DEFAULT_SENSOR[perception]
     if noise is None:
         noise = noise_model(perception, scene, sensor)
+        slower = (30.0 / control_hz) ** 2
+        noise = replace(noise, process=(slower * noise.process[0], slower * noise.process[1]))
     make_estimator(estimator, noise, alpha)
     rule = cast(Rule, sensor) if perception == "mask" else "six_smallest"
-    perceive = make_perception(perception, camera, rule=rule)
-    return Follower(perceive, lambda: make_estimator(estimator, noise, alpha))
+    perceive = make_perception(perception, camera, robot, rule)
+    return Follower(perceive, lambda: make_estimator(estimator, noise, alpha), robot=robot, dt=1.0 / control_hz)
 
 
 def _split(observation: Any) -> list[Any] | None:

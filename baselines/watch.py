@@ -31,6 +31,8 @@ def watch(cell: Cell, seed: int, video: Path, camera: tuple[int, int] = CAMERA) 
     Raises:
         ValueError: if the video cannot be written.
     """
+    if video.suffix != ".mp4":
+        raise ValueError(f"--video is {str(video)!r}; expected a name that ends in .mp4")
     sheet = video.with_suffix(".png")
     if not video.parent.is_dir():
         raise ValueError(f"the folder {video.parent} of --video does not exist; make it first or name another")
@@ -95,9 +97,7 @@ class _Writer:
         video = cv2.VideoWriter(str(self._path), cv2.VideoWriter.fourcc(*CODEC), self._rate, size)
         if video.isOpened():
             return video
-        raise ValueError(
-            f"the video {self._path} cannot be written; check the folder's permissions and the name's end, .mp4"
-        )
+        raise ValueError(f"the video {self._path} cannot be written; check the folder's permissions")
 
 
 def _contact_sheet(pictures: list[np.ndarray]) -> np.ndarray:

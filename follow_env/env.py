@@ -16,7 +16,14 @@ from follow_env.measurement import GaussMarkov, MeasurementModel
 from follow_env.person import gait
 from follow_env.person.body import CLOTHES
 from follow_env.physics import PERSON_RADIUS, PHYSICS_HZ, World
-from follow_env.reward import SET_POINT, reward_terms
+from follow_env.reward import (
+    BAND_BEARING,
+    BAND_DISTANCE,
+    SET_POINT,
+    SUCCESS_BAND_SHARE,
+    SUCCESS_OUT_OF_VIEW,
+    reward_terms,
+)
 from follow_env.routes import ROUTES, Route, make_route
 from follow_env.scenes import make_scene
 from follow_env.view import Dashboard, import_pygame, show_window
@@ -32,8 +39,6 @@ LOST_AFTER = 5.0
 """The episode ends when the person was out of view for longer than this, s."""
 HALF_TRUNK = 0.16
 """The person counts as visible while any of the trunk, this far to either side of its axis, is in view, m."""
-BAND = (1.0, 2.0, math.radians(30.0))
-"""In band: distance between the first two (m) and |bearing| up to the third (rad)."""
 
 
 class FollowEnv(gymnasium.Env):
@@ -102,12 +107,7 @@ class FollowEnv(gymnasium.Env):
     ) -> None:
         for name in unknown:
             choose("FollowEnv setting", name, SETTINGS)
-        if (
-            not isinstance(control_hz, int)
-            or isinstance(control_hz, bool)
-            or control_hz <= 0
-            or PHYSICS_HZ % control_hz
-        ):
+        if type(control_hz) is not int or control_hz <= 0 or PHYSICS_HZ % control_hz:
             raise ValueError(
                 f"control_hz is {control_hz!r}; expected a whole number that divides the physics rate {PHYSICS_HZ}, "
                 "for example 30"
@@ -317,8 +317,8 @@ class FollowEnv(gymnasium.Env):
         self._visible = self._in_view(self._distance - self.robot_config.camera_forward, left)
         self._out_of_view = 0 if self._visible else self._out_of_view + 1
         self._longest_out_of_view = max(self._longest_out_of_view, self._out_of_view)
-        low, high, width = BAND
-        self._in_band += low <= self._distance <= high and abs(self._bearing) <= width
+        low, high = BAND_DISTANCE
+        self._in_band += low <= self._distance <= high and abs(self._bearing) <= BAND_BEARING
 
     def _in_view(self, depth: float, left: float) -> bool:
         """Whether any of the trunk (axis, left or right side) is in the camera's field with a free line of sight."""
@@ -395,7 +395,9 @@ class FollowEnv(gymnasium.Env):
         assert self._world is not None
         steps = self._steps + 1
         success = (
-            self._collision == "none" and self._longest_out_of_view * self.dt <= 1.0 and self._in_band >= 0.8 * steps
+            self._collision == "none"
+            and self._longest_out_of_view * self.dt <= SUCCESS_OUT_OF_VIEW + 1e-9
+            and self._in_band >= SUCCESS_BAND_SHARE * steps
         )
         info = {
             "time": self.time,

@@ -1,7 +1,17 @@
-"""Bounded reward terms; their sum is the reward, the terms stand in `info["rewards"]`."""
+"""What good following is: bounded reward terms (they stand in `info["rewards"]`) and the rule for success."""
+
+import math
 
 SET_POINT = 1.5
-"""Following distance that is rewarded, m (paper B, section 3)."""
+"""Following distance that is rewarded, m (paper B, section 3); the bearing's set point is 0 rad."""
+BAND_DISTANCE = (1.0, 2.0)
+"""In band: the distance lies between these, m ..."""
+BAND_BEARING = math.radians(30.0)
+"""... and |bearing| is at most this, rad."""
+SUCCESS_BAND_SHARE = 0.8
+"""An episode succeeds without collision, in band for at least this share of its steps ..."""
+SUCCESS_OUT_OF_VIEW = 1.0
+"""... and with the person never out of view for longer than this, s."""
 
 
 def reward_terms(bearing: float, distance: float, visible: bool, effort: float, collided: bool) -> dict[str, float]:

@@ -11,8 +11,8 @@ def summary(calibration: dict[str, Any]) -> str:
     """Return measured errors, fitted sensors and filter noise as three Markdown tables."""
     return "\n\n".join(
         (
-            "Errors of each depth rule on rendered frames (bias and spread without outliers; outlier shares of all frames, "
-            f"and of those with the person nearer and farther than {calibration['how']['far_from_m']} m):",
+            "Errors of each depth rule on rendered frames (bias and spread without outliers; outlier shares of all "
+            f"frames, and of those with the person nearer and farther than {calibration['how']['far_from_m']} m):",
             _frames(calibration),
             "Emulated sensors, scaled to the paper's No filter row:",
             _sensors(calibration),

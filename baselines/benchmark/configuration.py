@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import importlib.metadata
 import json
@@ -15,12 +16,14 @@ from typing import Any
 
 from baselines.benchmark import metrics
 from baselines.benchmark.cells import ENVIRONMENT_IDS, Cell, family_cells, rule_cells, sensitivity_cells, table1_cells
+from follow_env.config import CameraConfig, RobotConfig, SensorConfig
 
 FILE_NAME = "config.json"
 EPISODES = {"truth": 100, "emulated": 100, "mask": 20}
 """Episodes per cell of Table 1 unless told otherwise, by perception: a rendered episode costs far more."""
 
-_STUDY_PART = {"emulated": 5, "mask": 2}
+_STUDY_PART = {"sensitivity": 5, "family": 1, "rules": 2}
+"""A study plays this part of the table's episodes, two at least."""
 _PACKAGES = (
     *("follow-env", "gymnasium", "matplotlib", "numpy", "opencv-python-headless"),
     *("pybullet", "scipy", "tqdm"),
@@ -68,34 +71,38 @@ class Plan:
         """Seeds of a cell of the table; calibration uses others."""
         return range(self.episodes[cell.perception])
 
-    def study_seeds(self, cell: Cell) -> range:
-        """Seeds of a cell of the studies: the table's first, so that what both need is played once."""
-        return range(max(2, self.episodes[cell.perception] // _STUDY_PART[cell.perception]))
+    def study_seeds(self, study: str) -> range:
+        """Seeds of the cells of a study: the table's first, so that what both need is played once."""
+        count = self.episodes["mask" if study == "rules" else "emulated"]
+        return range(max(2, count // _STUDY_PART[study]))
+
+    @property
+    def studies(self) -> dict[str, tuple[Cell, ...]]:
+        """The studies that are made, by name."""
+        studies = {"sensitivity": self.sensitivity, "family": self.family, "rules": self.rules}
+        return {name: cells for name, cells in studies.items() if cells}
 
     def tasks(self) -> list[tuple[Cell, int]]:
         """Every cell and seed that is needed, each once, cells that share an environment one after another."""
         wanted = [(cell, seed) for cell in self.table for seed in self.table_seeds(cell)]
-        studies = (*self.sensitivity, *self.family, *self.rules)
-        wanted += [(cell, seed) for cell in studies for seed in self.study_seeds(cell)]
+        for study, cells in self.studies.items():
+            wanted += [(cell, seed) for cell in cells for seed in self.study_seeds(study)]
         return list(dict.fromkeys(wanted))
 
 
-def settings(plan: Plan, calibration: Mapping[str, Any]) -> dict[str, Any]:
-    """Everything that changes an episode's result or says which cells there are; JSON-able.
+def settings(calibration: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything but the code that changes an episode's result; JSON-able.
 
     Args:
-        plan: Cells to run.
         calibration: Content of the calibration: sensors, noise covariances and how they were found.
     """
     return {
         "benchmark": "table1",
         "environments": ENVIRONMENT_IDS,
-        "cells": {
-            "table1": [cell.key for cell in plan.table],
-            "sensitivity": [cell.key for cell in plan.sensitivity],
-            "family": [cell.key for cell in plan.family],
-            "rules": [cell.key for cell in plan.rules],
-        },
+        "robot": dataclasses.asdict(RobotConfig()),
+        "camera": dataclasses.asdict(CameraConfig()),
+        "sensor": dataclasses.asdict(SensorConfig()),
+        "packages": {name: _version(name) for name in ("numpy", "opencv-python-headless", "pybullet")},
         "calibration": dict(calibration),
         "columns": list(metrics.COLUMNS),
     }
@@ -107,16 +114,34 @@ def digest(settings: Mapping[str, Any]) -> str:
     return hashlib.sha256(canonical.encode()).hexdigest()
 
 
+def run_digest(settings: Mapping[str, Any]) -> str:
+    """SHA-256 of the settings and of the code that plays and measures an episode: what runs must share to be mixed."""
+    return digest({**settings, "code": _code_digest()})
+
+
+def _code_digest() -> str:
+    root = Path(__file__).parents[2]
+    files = [
+        path for folder in ("follow_env", "tracker", "baselines/controllers") for path in (root / folder).rglob("*.py")
+    ]
+    files += [root / "baselines" / name for name in ("policy.py", "calibration.py")]
+    files += [Path(__file__).with_name(name) for name in ("assembly.py", "cells.py", "episodes.py", "metrics.py")]
+    total = hashlib.sha256()
+    for path in sorted(files):
+        total.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
+    return total.hexdigest()
+
+
 def document(plan: Plan, settings: Mapping[str, Any], folder: Path, jobs: int) -> str:
     """Text of ``config.json``: the settings and their hash, and beside them, unhashed, how this run was made."""
     content = {
         "settings": settings,
         "settings_sha256": digest(settings),
+        "run_sha256": run_digest(settings),
+        "cells": {name: [cell.key for cell in cells] for name, cells in {"table1": plan.table, **plan.studies}.items()},
         "seeds": {
             "table1": {perception: list(range(count)) for perception, count in plan.episodes.items()},
-            "studies": {
-                cell.perception: list(plan.study_seeds(cell)) for cell in (*plan.sensitivity, *plan.family, *plan.rules)
-            },
+            "studies": {study: list(plan.study_seeds(study)) for study in plan.studies},
         },
         "packages": packages(),
         "machine": machine(),

@@ -122,7 +122,7 @@ def _correlation(table: Table1, perception: str, scene: str, quantity: str) -> s
         return ""
     text = f"Successive errors of No filter correlate by {correlation:.2f}"
     if correlation >= _SLOW_ERRORS:
-        return f"{text}: they change too slowly for a filter to average them away."
+        return f"{text}, which limits what averaging over a few steps can remove."
     return f"{text}, so averaging could remove more: the gain that the rule for Q gives leaves the rest."
 
 
@@ -149,7 +149,7 @@ def _outliers(table: Table1, perception: str, scene: str, quantity: str) -> str:
     carried = weighted_share(none_rows, f"{quantity}_outlier_square_share", squares.tolist()) or 0.0
     inflated = weighted_share(table.cell(perception, scene, "akf"), f"{quantity}_inflated_share") or 0.0
     text = (
-        f"Outliers (beyond three robust standard deviations) are {share:.1%} of No filter's errors "
+        f"Tails (beyond three robust standard deviations) are {share:.1%} of No filter's errors "
         f"and carry {carried:.0%} of its squared error"
     )
     if carried < _FEW_OUTLIERS:

@@ -7,26 +7,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from baselines.benchmark.cells import Cell
+from follow_env.reward import BAND_BEARING, BAND_DISTANCE, SET_POINT, SUCCESS_BAND_SHARE, SUCCESS_OUT_OF_VIEW
 from tracker.filters import Estimate
 
 Row = dict[str, "str | int | float | None"]
 """One episode's numbers by column name; None where a column does not apply, never NaN."""
 
-SET_DISTANCE = 1.5
-"""Distance to keep, m (paper B); the bearing's set point is 0 rad."""
-BAND_DISTANCE = (1.0, 2.0)
-BAND_BEARING = math.radians(30.0)
 PERSONAL_SURFACE = 0.45
 """Surface distance below which the robot stands in the intimate zone, m."""
-SUCCESS_BAND_SHARE = 0.8
-SUCCESS_OUT_OF_VIEW = 1.0
 OUTLIER_SIGMAS = 3.0
 MAD_TO_SIGMA = 1.4826
 NIS_BOUNDS = (0.000982069, 5.023886)
@@ -84,7 +79,7 @@ class EpisodeMetrics:
         spans = _out_of_view(steps)
         longest = max(spans, default=0.0)
         in_band = _share(_in_band(step) for step in steps)
-        success = ended == "time" and longest <= SUCCESS_OUT_OF_VIEW and in_band >= SUCCESS_BAND_SHARE
+        success = ended == "time" and longest <= SUCCESS_OUT_OF_VIEW + 1e-9 and in_band >= SUCCESS_BAND_SHARE
         row: Row = {
             "perception": self._cell.perception,
             "scene": self._cell.scene,
@@ -100,7 +95,7 @@ class EpisodeMetrics:
             "estimate_steps": len(estimated),
             "measurement_share": _share(step.measured for step in steps),
             "angle_tracking_rmse_rad": _rms([step.bearing for step in steps]),
-            "distance_tracking_rmse_m": _rms([step.distance - SET_DISTANCE for step in steps]),
+            "distance_tracking_rmse_m": _rms([step.distance - SET_POINT for step in steps]),
             "in_band_share": in_band,
             "longest_out_of_view_s": longest,
             "loss_count": len(spans),
@@ -253,18 +248,9 @@ def _differences(values: Sequence[float], steps: Sequence[_Step]) -> list[float]
 
 
 def _out_of_view(steps: Sequence[_Step]) -> list[float]:
-    """Durations, s, of the spans out of view: from the first instant unseen to the next one seen, or to the end."""
-    spans = []
-    since: float | None = None
-    for step in steps:
-        if step.visible and since is not None:
-            spans.append(step.time - since)
-            since = None
-        elif not step.visible and since is None:
-            since = step.time
-    if since is not None:
-        spans.append(steps[-1].time - since)
-    return spans
+    """Durations, s, of the spans out of view: the number of instants unseen in a row times the period."""
+    period = (steps[-1].time - steps[0].time) / max(len(steps) - 1, 1)
+    return [period * len(list(span)) for visible, span in groupby(steps, key=lambda step: step.visible) if not visible]
 
 
 def _in_band(step: _Step) -> bool:

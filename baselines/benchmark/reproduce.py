@@ -51,8 +51,8 @@ def reproduce(
         EpisodeError: If an episode fails; the finished ones are kept.
         Interrupted: On Ctrl-C; the finished episodes are kept.
     """
-    settings = configuration.settings(plan, calibration)
-    digest = configuration.digest(settings)
+    settings = configuration.settings(calibration)
+    digest = configuration.run_digest(settings)
     _claim(out)
     with Store(out, digest) as episodes:
         if len(episodes) and not resume:
@@ -125,20 +125,17 @@ def _write_results(plan: Plan, episodes: Store, out: Path) -> str:
     write_csv(out / "curves.csv", CURVE_COLUMNS, curves, _DIGITS)
     drawn = figures.draw_curves(curves, out / FIGURES)
     rules: list[Record] = []
-    for name, cells, columns, draw in (
-        ("sensitivity", plan.sensitivity, SENSITIVITY_COLUMNS, figures.draw_sensitivity),
-        ("family", plan.family, FAMILY_COLUMNS, figures.draw_sensors),
-        ("rules", plan.rules, FAMILY_COLUMNS, figures.draw_sensors),
-    ):
-        if cells:
-            study = {cell: [episodes.episode(cell, seed) for seed in plan.study_seeds(cell)] for cell in cells}
-            write_csv(out / f"{name}_episodes.csv", metrics.COLUMNS, _rows(study))
-            records = study_records({cell: [played.row for played in group] for cell, group in study.items()})
-            write_csv(out / f"{name}.csv", columns, records, _DIGITS)
-            drawn.append(out / FIGURES / f"{name}.png")
-            draw(records, drawn[-1])
-            if name == "rules":
-                rules = records
+    for name, cells in plan.studies.items():
+        study = {cell: [episodes.episode(cell, seed) for seed in plan.study_seeds(name)] for cell in cells}
+        write_csv(out / f"{name}_episodes.csv", metrics.COLUMNS, _rows(study))
+        records = study_records({cell: [played.row for played in group] for cell, group in study.items()})
+        columns = SENSITIVITY_COLUMNS if name == "sensitivity" else FAMILY_COLUMNS
+        write_csv(out / f"{name}.csv", columns, records, _DIGITS)
+        drawn.append(out / FIGURES / f"{name}.png")
+        draw = figures.draw_sensitivity if name == "sensitivity" else figures.draw_sensors
+        draw(records, drawn[-1])
+        if name == "rules":
+            rules = records
     measured = Table1({cell: [played.row for played in group] for cell, group in table.items()})
     write_csv(out / "table1.csv", COLUMNS, measured.records(), _DIGITS)
     text = report(measured, rules)

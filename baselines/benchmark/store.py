@@ -143,10 +143,13 @@ class Store:
                     self._connection.execute(statement)
                 self._connection.execute("INSERT INTO configuration VALUES (?)", (configuration,))
                 self._connection.execute(f"PRAGMA application_id = {_APPLICATION}")
-            (stored,) = self._connection.execute("SELECT sha256 FROM configuration").fetchone()
+            found = self._connection.execute("SELECT sha256 FROM configuration").fetchone()
+            if found is None:
+                raise self._damaged("its configuration is missing")
+            (stored,) = found
             if stored != configuration and len(self):
                 raise InputError(
-                    f"{self._path.parent} holds {len(self)} episodes of another configuration "
+                    f"{self._path.parent} holds {len(self)} episodes of another configuration or version of the code "
                     f"({stored[:12]}, this one is {configuration[:12]}): choose another folder with --out."
                 )
             self._connection.execute("UPDATE configuration SET sha256 = ?", (configuration,))

@@ -1,9 +1,11 @@
 """`follow` as a user meets it: quick help, one sentence and exit code 2 for bad input, and a clean end on Ctrl-C."""
 
+import contextlib
 import fcntl
 import os
 import pty
 import signal
+import sqlite3
 import struct
 import subprocess
 import sys
@@ -101,8 +103,14 @@ def test_a_folder_that_is_taken_is_kept(finished: Path) -> None:
     before = {path: path.read_bytes() for path in finished.iterdir() if path.is_file()}
     again = complaint(follow(*TABLE1, "--out", "results", cwd=finished.parent))
     assert "results already holds 8 episodes of this configuration: go on with --resume" in again
-    other = ["reproduce", "table1", "--perception", "emulated", "--episodes", "1", "--out", "results", "--resume"]
-    assert "another configuration" in complaint(follow(*other, cwd=finished.parent))
+    with contextlib.closing(sqlite3.connect(finished / FILE_NAME)) as store, store:
+        (ours,) = store.execute("SELECT sha256 FROM configuration").fetchone()
+        store.execute("UPDATE configuration SET sha256 = ?", ("0" * 64,))
+    other = complaint(follow(*TABLE1, "--out", "results", "--resume", cwd=finished.parent))
+    assert "holds 8 episodes of another configuration or version of the code (000000000000" in other
+    with contextlib.closing(sqlite3.connect(finished / FILE_NAME)) as store, store:
+        store.execute("UPDATE configuration SET sha256 = ?", (ours,))
+    before[finished / FILE_NAME] = (finished / FILE_NAME).read_bytes()
     (finished / FILE_NAME).write_bytes(before[finished / FILE_NAME][:5000])
     damaged = complaint(follow(*TABLE1, "--out", "results", "--resume", cwd=finished.parent))
     assert "results/episodes.sqlite is damaged" in damaged

@@ -75,4 +75,8 @@ def test_it_was_made_with_these_settings():
     config = json.loads((RUN / "config.json").read_text(encoding="utf-8"))
     plan = Plan.of(["emulated", "mask"], None, calibration.family())
 
-    assert config["settings_sha256"] == configuration.digest(configuration.settings(plan, calibration.settings()))
+    assert config["settings_sha256"] == configuration.digest(configuration.settings(calibration.settings()))
+    assert config["cells"]["table1"] == [cell.key for cell in plan.table]
+    assert {name: len(seeds) for name, seeds in config["seeds"]["studies"].items()} == {
+        name: len(plan.study_seeds(name)) for name in plan.studies
+    }

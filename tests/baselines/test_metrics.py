@@ -144,13 +144,13 @@ def test_following_errors_are_those_of_the_truth_to_the_set_point() -> None:
     assert row["distance_tracking_rmse_m"] == pytest.approx(0.2)
 
 
-def test_time_out_of_view_runs_from_the_first_unseen_instant_to_the_next_seen_one() -> None:
+def test_time_out_of_view_is_the_number_of_instants_unseen_times_the_period() -> None:
     unseen = {*range(10, 25), *range(50, 53), *range(90, 100)}
     row = finish([(info(k, visible=k not in unseen), estimate()) for k in range(100)])
     assert row["loss_count"] == 3
     assert row["longest_out_of_view_s"] == pytest.approx(15 * DT)
     row = finish([(info(k, visible=k < 60), estimate()) for k in range(100)])
-    assert row["longest_out_of_view_s"] == pytest.approx(39 * DT)
+    assert row["longest_out_of_view_s"] == pytest.approx(40 * DT)
 
 
 def test_seconds_in_the_intimate_zone() -> None:

@@ -91,7 +91,7 @@ def test_slow_errors_and_a_single_bad_episode_are_named() -> None:
     names = ("none", "kf", "akf", "akf_cv")
     table = made(dict.fromkeys(names, 0.0), dict(zip(names, (0.15, 0.145, 0.145, 0.145), strict=True)))
     text = str(explain(table, "emulated", "corridor", "distance"))
-    assert "Successive errors of No filter correlate by 0.90: they change too slowly" in text
+    assert "Successive errors of No filter correlate by 0.90, which limits what averaging" in text
     assert "Seed" not in text
     bad = table.rows[Cell("emulated", "corridor", "kf")][7]
     bad |= {"distance_rmse_m": 2.0, "ended": "collision", "loss_count": 2, "longest_out_of_view_s": 1.44}

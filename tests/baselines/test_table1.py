@@ -18,6 +18,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from baselines.benchmark import configuration
 from baselines.benchmark import reproduce as reproduction
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.configuration import Plan, digest, settings
@@ -109,7 +110,7 @@ def test_a_run_killed_again_and_again_ends_with_the_same_bytes(finished: Path, t
             if delay is not None:
                 time.sleep(delay)
                 process.send_signal(signal.SIGKILL)
-        with Store(out, json.loads((out / "config.json").read_text(encoding="utf-8"))["settings_sha256"]) as store:
+        with Store(out, json.loads((out / "config.json").read_text(encoding="utf-8"))["run_sha256"]) as store:
             kept.append(len(store))
     assert process.returncode == 0
     assert 0 < kept[0] < kept[1] < kept[2] < kept[3] == kept[4] == kept[5] == int(tasks)
@@ -255,20 +256,31 @@ def test_config_names_what_made_the_results(synthetic: ModuleType, finished: Pat
     canonical = json.dumps(config["settings"], sort_keys=True, separators=(",", ":"))
     assert config["settings_sha256"] == hashlib.sha256(canonical.encode()).hexdigest()
     assert config["settings"]["calibration"] == synthetic.CALIBRATION
-    assert len(config["settings"]["cells"]["table1"]) == 8
-    assert config["seeds"] == {"table1": {"emulated": [0, 1, 2, 3]}, "studies": {"emulated": [0, 1]}}
+    assert len(config["cells"]["table1"]) == 8
+    assert config["seeds"] == {
+        "table1": {"emulated": [0, 1, 2, 3]},
+        "studies": {"sensitivity": [0, 1], "family": [0, 1, 2, 3]},
+    }
     assert config["packages"]["numpy"] == np.__version__
     assert {"platform", "python", "cpu"} <= config["machine"].keys()
     assert str(finished.parent) not in json.dumps(config)
 
 
 def test_the_hash_covers_what_changes_results_and_nothing_else() -> None:
-    base = Plan.of(["emulated"], 4, ["white"])
-    same = digest(settings(Plan.of(["emulated"], 50, ["white"]), {"r": 1.0}))
-    assert digest(settings(base, {"r": 1.0})) == same
-    assert digest(settings(base, {"r": 1.1})) != same
-    assert digest(settings(Plan.of(["emulated"], 4, ["bursts"]), {"r": 1.0})) != same
-    assert digest(settings(Plan.of(["emulated", "mask"], 4, ["white"]), {"r": 1.0})) != same
+    base = settings({"r": 1.0})
+    assert digest(settings({"r": 1.0})) == digest(base)
+    assert digest(settings({"r": 1.1})) != digest(base)
+    for group, name in (("robot", "max_speed"), ("camera", "hfov_deg"), ("packages", "pybullet")):
+        assert digest({**base, group: {**base[group], name: "changed"}}) != digest(base)
+
+
+def test_another_version_of_the_code_is_another_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    base = settings({"r": 1.0})
+    before = configuration.run_digest(base)
+    assert before != digest(base)
+    read_bytes = Path.read_bytes
+    monkeypatch.setattr(Path, "read_bytes", lambda path: read_bytes(path) + b"#" * (path.name == "filters.py"))
+    assert configuration.run_digest(base) != before
 
 
 def test_raw_rows_read_back_as_the_very_floats(synthetic: ModuleType, finished: Path) -> None:

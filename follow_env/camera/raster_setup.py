@@ -1,0 +1,320 @@
+"""Kernels that prepare a picture: which flat facets, cylinders and triangles may be seen, and where.
+
+Camera frame: X right, Y down, Z forward along the optical axis; the camera is level. A pixel looks along the ray
+(X, Y, 1), and a plane n . P = d is seen at 1/Z = (nx X + ny Y + nz) / d: affine in the picture, exact everywhere.
+An edge from P to Q splits the picture by the sign of (Q x P) . (X, Y, 1), also when an end lies behind the camera, so
+nothing has to be cut at the near plane. Neighbours see the same edge with exactly opposite signs: no cracks.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+FACET_NUMBERS = 16
+"""Columns of a facet's record: four edges of three coefficients, then the three of 1/Z, then the greatest 1/Z."""
+TRIANGLE_NUMBERS = 24
+"""Columns of a triangle's: three edges, 1/Z, light/Z, and the three anchor coordinates/Z, of three coefficients each."""
+BLACK = np.float32(0.0)
+_CORNERS = np.array([[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4, 6, 7, 5]], np.int64)
+"""Corners of the faces -x, +x, -y, +y, -z, +z, clockwise seen from outside; bit k of a corner is the sign of axis k."""
+
+_jit = njit(nogil=True, error_model="numpy")
+
+
+@_jit
+def tile_range(low, high, first, step, tiles):
+    """Return the first and last tile that rays with `low` <= ray <= `high` can meet (last < first: none)."""
+    start, stop = (low - first) / step, (high - first) / step
+    limit = 16.0 * tiles
+    start, stop = min(max(start - 0.01, -1.0), limit), min(max(stop + 0.01, -1.0), limit)
+    return int(math.ceil(start)) // 16 if start > 0.0 else 0, int(math.floor(stop)) // 16 if stop >= 0.0 else -1
+
+
+@_jit
+def polygon_bounds(corners, count, near, bounds):
+    """Write (x_min, x_max, y_min, y_max) of the rays that meet the polygon (count, 3) beyond `near`; False if none."""
+    bounds[0], bounds[1], bounds[2], bounds[3] = np.inf, -np.inf, np.inf, -np.inf
+    seen = False
+    for i in range(count):
+        k = i + 1 if i + 1 < count else 0
+        z, z_next = corners[i, 2], corners[k, 2]
+        x, y = corners[i, 0], corners[i, 1]
+        if z >= near:
+            seen = True
+            bounds[0], bounds[1] = min(bounds[0], x / z), max(bounds[1], x / z)
+            bounds[2], bounds[3] = min(bounds[2], y / z), max(bounds[3], y / z)
+        if (z >= near) != (z_next >= near):
+            share = (near - z) / (z_next - z)
+            x, y = x + share * (corners[k, 0] - x), y + share * (corners[k, 1] - y)
+            seen = True
+            bounds[0], bounds[1] = min(bounds[0], x / near), max(bounds[1], x / near)
+            bounds[2], bounds[3] = min(bounds[2], y / near), max(bounds[3], y / near)
+    return seen
+
+
+@_jit
+def outside(x, y, z, radius, view):
+    """Whether the sphere around (x, y, z) lies outside the field of view for certain."""
+    near, far, wide, high = view.near, view.far, view.wide, view.high
+    if z + radius < near or z - radius > far:
+        return True
+    return (
+        abs(x) - wide * z > radius * math.sqrt(1.0 + wide * wide)
+        or abs(y) - high * z > radius * math.sqrt(1.0 + high * high)
+    )
+
+
+@_jit
+def find_facets(view, boxes, work):
+    """Fill `work.facets` and `work.places` with the faces of the boxes that may be seen, nearest first; return how many.
+
+    A face turned away is left out unless the camera is so close that the near plane may cut the box open.
+    """
+    ex, ey, ez, c, s, near, far = view.x, view.y, view.z, view.cosine, view.sine, view.near, view.far
+    reach = near * math.sqrt(1.0 + view.wide ** 2 + view.high ** 2)
+    corners, quad, bounds = work.corners, work.quad, work.bounds
+    count = 0
+    for b in range(boxes.shape[0]):
+        dx, dy, dz = boxes[b, 0] - ex, boxes[b, 1] - ey, boxes[b, 2] - ez
+        hx, hy, hz, bc, bs = boxes[b, 3], boxes[b, 4], boxes[b, 5], boxes[b, 6], boxes[b, 7]
+        if outside(s * dx - c * dy, -dz, c * dx + s * dy, math.sqrt(hx * hx + hy * hy + hz * hz), view):
+            continue
+        own = (-(bc * dx + bs * dy), bs * dx - bc * dy, -dz)
+        half = (hx, hy, hz)
+        gap_x, gap_y, gap_z = max(abs(own[0]) - hx, 0.0), max(abs(own[1]) - hy, 0.0), max(abs(own[2]) - hz, 0.0)
+        cut = gap_x * gap_x + gap_y * gap_y + gap_z * gap_z <= reach * reach
+        for k in range(8):
+            x, y = (hx if k & 1 else -hx), (hy if k & 2 else -hy)
+            wx, wy = dx + bc * x - bs * y, dy + bs * x + bc * y
+            corners[k, 0], corners[k, 2] = s * wx - c * wy, c * wx + s * wy
+            corners[k, 1] = -(dz + (hz if k & 4 else -hz))
+        for face in range(6):
+            axis = face // 2
+            height = (own[axis] if face % 2 else -own[axis]) - half[axis]
+            if height == 0.0 or (height < 0.0 and not cut):
+                continue
+            nearest = 0.0
+            for i in range(4):
+                k = _CORNERS[face, i]
+                for m in range(3):
+                    quad[i, m] = corners[k, m]
+                nearest = max(nearest, 1.0 / quad[i, 2] if quad[i, 2] > near else 1.0 / near)
+            if not polygon_bounds(quad, 4, near, bounds) or nearest * far < 1.0:
+                continue
+            tx0, tx1 = tile_range(bounds[0], bounds[1], view.left, view.step, view.columns)
+            ty0, ty1 = tile_range(bounds[2], bounds[3], view.top, view.step, view.rows)
+            if tx0 > tx1 or ty0 > ty1 or tx0 >= view.columns or ty0 >= view.rows:
+                continue
+            _edges(quad, 4, 1.0 if height > 0.0 else -1.0, work.facets, count)
+            _plane(quad, work.facets, count)
+            work.facets[count, 15] = nearest
+            place = work.places
+            place[count, 0], place[count, 1], place[count, 2] = 1 + 6 * b + face, tx0, tx1
+            place[count, 3], place[count, 4] = ty0, ty1
+            count += 1
+    _sort(work, count)
+    return count
+
+
+@_jit
+def _edges(corners, count, sign, records, row):
+    """Write the coefficients of the edges of a polygon given clockwise as seen from the camera (sign 1), or not (-1)."""
+    for i in range(count):
+        k = i + 1 if i + 1 < count else 0
+        px, py, pz = corners[i, 0], corners[i, 1], corners[i, 2]
+        qx, qy, qz = corners[k, 0], corners[k, 1], corners[k, 2]
+        records[row, 3 * i] = sign * (py * qz - pz * qy)
+        records[row, 3 * i + 1] = sign * (pz * qx - px * qz)
+        records[row, 3 * i + 2] = sign * (px * qy - py * qx)
+
+
+@_jit
+def _plane(quad, records, row):
+    """Write the coefficients of 1/Z over the picture of a parallelogram's plane."""
+    ax, ay, az = quad[1, 0] - quad[0, 0], quad[1, 1] - quad[0, 1], quad[1, 2] - quad[0, 2]
+    bx, by, bz = quad[3, 0] - quad[0, 0], quad[3, 1] - quad[0, 1], quad[3, 2] - quad[0, 2]
+    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    d = nx * quad[0, 0] + ny * quad[0, 1] + nz * quad[0, 2]
+    records[row, 12], records[row, 13], records[row, 14] = nx / d, ny / d, nz / d
+
+
+@_jit
+def _sort(work, count):
+    """Sort the order of the facets by their greatest 1/Z, descending, into `work.order`."""
+    order, facets = work.order, work.facets
+    for i in range(count):
+        k = i
+        while k > 0 and facets[order[k - 1], 15] < facets[i, 15]:
+            order[k] = order[k - 1]
+            k -= 1
+        order[k] = i
+
+
+@_jit
+def find_cylinders(view, cylinders, work):
+    """Fill `work.rounds` with the cylinders that may be seen; return how many.
+
+    A record is (X, Z of the axis, radius, Y of the top, Y of the bottom, greatest 1/Z, draw the top, the bottom).
+    """
+    ex, ey, ez, c, s, near = view.x, view.y, view.z, view.cosine, view.sine, view.near
+    reach = near * math.sqrt(1.0 + view.wide ** 2 + view.high ** 2)
+    count = 0
+    for n in range(cylinders.shape[0]):
+        dx, dy = cylinders[n, 0] - ex, cylinders[n, 1] - ey
+        low, high, radius = cylinders[n, 2], cylinders[n, 3], cylinders[n, 4]
+        top, bottom = ez - high, ez - low
+        x, z = s * dx - c * dy, c * dx + s * dy
+        if outside(x, 0.5 * (top + bottom), z, math.sqrt(radius * radius + 0.25 * (high - low) ** 2), view):
+            continue
+        gap, rise = max(math.sqrt(dx * dx + dy * dy) - radius, 0.0), max(top, -bottom, 0.0)
+        cut = gap * gap + rise * rise <= reach * reach
+        front, back = z - radius, z + radius
+        tx0, tx1, ty0, ty1 = 0, view.columns - 1, 0, view.rows - 1
+        if front > near:
+            left, right = x - radius, x + radius
+            tx0, tx1 = tile_range(
+                min(left / front, left / back), max(right / front, right / back), view.left, view.step, view.columns
+            )
+            ty0, ty1 = tile_range(
+                min(top / front, top / back), max(bottom / front, bottom / back), view.top, view.step, view.rows
+            )
+        if tx0 > tx1 or ty0 > ty1 or tx0 >= view.columns or ty0 >= view.rows:
+            continue
+        rounds, place = work.rounds, work.round_places
+        rounds[count, 0], rounds[count, 1], rounds[count, 2], rounds[count, 3], rounds[count, 4] = x, z, radius, top, bottom
+        rounds[count, 5] = 1.0 / max(front, near)
+        rounds[count, 6], rounds[count, 7] = top > 0.0 or cut, bottom < 0.0 or cut
+        place[count, 0], place[count, 1], place[count, 2], place[count, 3], place[count, 4] = n, tx0, tx1, ty0, ty1
+        count += 1
+    return count
+
+
+@_jit
+def find_triangles(view, people, scene, work):
+    """Fill `work.triangles` with the triangles of people that may be seen; return how many, or -1 if one is not finite.
+
+    A triangle turned away, or that meets no pixel centre, is left out. Vertices are lit here, once each, and the light
+    is interpolated over the triangle in perspective.
+    """
+    near = view.near
+    vertices, faces = people.vertices, people.faces
+    corners, bounds = work.quad, work.bounds
+    count = 0
+    for person in range(people.starts.shape[0] - 1):
+        first, last = people.starts[person, 0], people.starts[person + 1, 0]
+        ahead = _to_camera(view, vertices, first, last, work.camera_points)
+        if ahead < 0:
+            return -1
+        if ahead == 0:
+            continue
+        _light_vertices(people, first, last, scene, work.vertex_light)
+        for f in range(people.starts[person, 1], people.starts[person + 1, 1]):
+            behind = False
+            for i in range(3):
+                for m in range(3):
+                    corners[i, m] = work.camera_points[faces[f, i], m]
+                behind |= corners[i, 2] < near
+            record = work.triangles
+            _edges(corners, 3, -1.0, record, count)
+            volume = -(
+                corners[0, 0] * (corners[1, 1] * corners[2, 2] - corners[1, 2] * corners[2, 1])
+                + corners[0, 1] * (corners[1, 2] * corners[2, 0] - corners[1, 0] * corners[2, 2])
+                + corners[0, 2] * (corners[1, 0] * corners[2, 1] - corners[1, 1] * corners[2, 0])
+            )
+            if volume <= 0.0:
+                continue
+            if behind:
+                if not polygon_bounds(corners, 3, near, bounds):
+                    continue
+                x0, x1, y0, y1 = bounds[0], bounds[1], bounds[2], bounds[3]
+            else:
+                u0, v0 = corners[0, 0] / corners[0, 2], corners[0, 1] / corners[0, 2]
+                u1, v1 = corners[1, 0] / corners[1, 2], corners[1, 1] / corners[1, 2]
+                u2, v2 = corners[2, 0] / corners[2, 2], corners[2, 1] / corners[2, 2]
+                x0, x1, y0, y1 = min(u0, u1, u2), max(u0, u1, u2), min(v0, v1, v2), max(v0, v1, v2)
+            place = work.triangle_places
+            if not _pixels(x0, x1, view.left, view.step, view.width, place, count, 1):
+                continue
+            if not _pixels(y0, y1, view.top, view.step, view.height, place, count, 3):
+                continue
+            place[count, 0] = f
+            _interpolants(f, volume, people, work, count)
+            count += 1
+    return count
+
+
+@_jit
+def _to_camera(view, vertices, first, last, points):
+    """Move vertices to the camera frame; return how many lie beyond the near plane, or -1 if one is not finite."""
+    ex, ey, ez, c, s, near = view.x, view.y, view.z, view.cosine, view.sine, view.near
+    ahead, total = 0, 0.0
+    for i in range(first, last):
+        dx, dy, dz = vertices[i, 0] - ex, vertices[i, 1] - ey, vertices[i, 2] - ez
+        points[i, 0], points[i, 1], points[i, 2] = s * dx - c * dy, -dz, c * dx + s * dy
+        total += abs(dx) + abs(dy) + abs(dz)
+        if points[i, 2] >= near:
+            ahead += 1
+    return ahead if math.isfinite(total) else -1
+
+
+@_jit
+def _light_vertices(people, first, last, scene, light):
+    for i in range(first, last):
+        light[i] = scene.ambient
+    for n in range(scene.lamps.shape[0]):
+        for i in range(first, last):
+            light[i] += lamp_light(
+                scene.lamps[n, 0] - people.vertices[i, 0],
+                scene.lamps[n, 1] - people.vertices[i, 1],
+                scene.lamps[n, 2] - people.vertices[i, 2],
+                people.normals[i, 0],
+                people.normals[i, 1],
+                people.normals[i, 2],
+                scene.lamps[n, 3],
+            )
+
+
+@_jit
+def _pixels(low, high, first, step, size, place, row, column):
+    """Write the first and last pixel whose centre may lie between the rays; False if there is none."""
+    start, stop = (low - first) / step, (high - first) / step
+    if not (stop > -0.01 and start < size - 0.99):
+        return False
+    place[row, column] = int(math.ceil(max(start - 0.01, 0.0)))
+    place[row, column + 1] = int(math.floor(min(stop + 0.01, size - 1.0)))
+    return place[row, column] <= place[row, column + 1]
+
+
+@_jit
+def _interpolants(f, volume, people, work, row):
+    """Write the planes of 1/Z, light/Z and, for patterned faces, anchors/Z: edge i belongs to the corner opposite."""
+    record, faces = work.triangles, people.faces
+    for m in range(3):
+        # Edge 0 runs from corner 0 to 1, so it measures corner 2, and so on.
+        e2, e0, e1 = record[row, m] / volume, record[row, 3 + m] / volume, record[row, 6 + m] / volume
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        record[row, 9 + m] = e0 + e1 + e2
+        record[row, 12 + m] = e0 * work.vertex_light[a] + e1 * work.vertex_light[b] + e2 * work.vertex_light[c]
+        if people.pattern[f]:
+            for k in range(3):
+                record[row, 15 + 3 * k + m] = (
+                    e0 * people.anchors[a, k] + e1 * people.anchors[b, k] + e2 * people.anchors[c, k]
+                )
+
+
+_SOFT = np.float32(0.05)
+_BOUNCE, _DIRECT = np.float32(0.35), np.float32(0.65)
+_ONE = np.float32(1.0)
+
+
+@_jit
+def lamp_light(dx, dy, dz, nx, ny, nz, strength):
+    """Return the light of one lamp at the offset (dx, dy, dz) m from a surface with this normal.
+
+    It falls with the squared distance (kept finite near the lamp); 65 % of it follows Lambert's law and 35 % stands for
+    what comes back from the walls.
+    """
+    q = _ONE / math.sqrt(((dx * dx + dy * dy) + dz * dz) + _SOFT)
+    facing = max(((nx * dx + ny * dy) + nz * dz) * q, BLACK)
+    return strength * (q * q) * (_BOUNCE + _DIRECT * facing)

@@ -1,7 +1,8 @@
 """Kernels that decide, within one tile of 16 x 16 pixels, what is nearest at every pixel centre.
 
-A tile holds 1/Z (float32) and the number of the surface seen; nearer means a greater 1/Z, and the first drawn wins a
-tie. Rows of 16 pixels are drawn whole, with a test in each lane, so that the compiler can use vector instructions.
+A tile is one flat float32 array of planes of 256 numbers, `lanes[PLANE + 16 * row + column]`, beside `seen` (256,)
+int32, the number of the surface at each pixel. Plane `DEPTH` holds 1/Z; nearer means greater, and the first drawn wins a
+tie. All pixels are computed and tested alike, one array and no branch, so that the compiler uses vector instructions.
 """
 
 import math
@@ -10,119 +11,132 @@ import numpy as np
 from numba import njit
 
 TILE = 16
-_ZERO, _ONE = np.float32(0.0), np.float32(1.0)
+PIXELS = np.uint64(TILE * TILE)
+# Planes of a tile: the pixel's ray, 1/Z, the surface point and its normal, texture coordinates, and light.
+X, Y, DEPTH, POINT_X, POINT_Y, POINT_Z, NORMAL_X, NORMAL_Y, S, T, SHADE, LIGHT, COLUMN = np.arange(
+    0, 13 * TILE * TILE, TILE * TILE, dtype=np.uint64
+)
+LOW, HIGH = COLUMN + np.uint64(TILE), COLUMN + np.uint64(2 * TILE)
+PLANES = 13
+_ZERO = np.float32(0.0)
 _NOWHERE = np.float32(-1.0)
 
 _jit = njit(nogil=True, error_model="numpy")
 
 
 @_jit
-def fill_facet(record, number, tile, limit, floor):
-    """Draw a facet of up to four edges into the tile; return the least 1/Z that the tile now has for certain.
+def clear(lanes, seen, left, top, step, background):
+    """Make the tile empty: the rays of its pixels, 1/Z = `background` and nothing seen."""
+    for i in range(TILE):
+        y = np.float32(top + i * step)
+        for j in range(TILE):
+            k = np.uint64(TILE * i + j)
+            lanes[X + k] = left + j * step
+            lanes[Y + k] = y
+    for k in range(PIXELS):
+        lanes[DEPTH + k] = background
+        seen[k] = 0
 
-    Args:
-        record: (16,) float32, edges and 1/Z, see `raster_setup`.
-        number: the surface's number.
-        tile: the tile's rays and buffers.
-        limit: 1 / near.
-        floor: the least 1/Z in the tile so far.
+
+@_jit
+def fill_facet(facets, f, number, lanes, seen, limit, floor):
+    """Draw facet `f` (see `raster_setup`) into the tile; return the least 1/Z that the tile now has for certain.
+
+    `limit` is 1 / near, `floor` the least 1/Z in the tile so far: what lies behind it is left out.
     """
-    xs, ys, depth, seen = tile.xs, tile.ys, tile.depth, tile.seen
+    x0, x1, y0, y1 = lanes[X], lanes[X + PIXELS - np.uint64(1)], lanes[Y], lanes[Y + PIXELS - np.uint64(1)]
     whole = True
     for i in range(4):
-        a, b, c = record[3 * i], record[3 * i + 1], record[3 * i + 2]
-        ax0, ax1, by0, by1 = a * xs[0], a * xs[TILE - 1], b * ys[0], b * ys[TILE - 1]
+        a, b, c = facets[f, 3 * i], facets[f, 3 * i + 1], facets[f, 3 * i + 2]
+        ax0, ax1, by0, by1 = a * x0, a * x1, b * y0, b * y1
         if (max(ax0, ax1) + max(by0, by1)) + c < _ZERO:
             return floor
         whole &= (min(ax0, ax1) + min(by0, by1)) + c >= _ZERO
-    a, b, c = record[12], record[13], record[14]
-    ax0, ax1, by0, by1 = a * xs[0], a * xs[TILE - 1], b * ys[0], b * ys[TILE - 1]
+    a, b, c = facets[f, 12], facets[f, 13], facets[f, 14]
+    ax0, ax1, by0, by1 = a * x0, a * x1, b * y0, b * y1
     nearest, farthest = (max(ax0, ax1) + max(by0, by1)) + c, (min(ax0, ax1) + min(by0, by1)) + c
-    if min(nearest, record[15]) <= floor:
+    if min(nearest, facets[f, 15]) <= floor:
         return floor
     if whole and nearest <= limit:
-        for i in range(TILE):
-            base = b * ys[i]
-            for j in range(TILE):
-                value = (a * xs[j] + base) + c
-                nearer = value > depth[i, j]
-                depth[i, j] = value if nearer else depth[i, j]
-                seen[i, j] = number if nearer else seen[i, j]
+        for k in range(PIXELS):
+            value = (a * lanes[X + k] + b * lanes[Y + k]) + c
+            nearer = value > lanes[DEPTH + k]
+            lanes[DEPTH + k] = value if nearer else lanes[DEPTH + k]
+            seen[k] = number if nearer else seen[k]
         return max(floor, farthest)
-    a0, a1, a2, a3 = record[0], record[3], record[6], record[9]
-    c0, c1, c2, c3 = record[2], record[5], record[8], record[11]
-    for i in range(TILE):
-        y = ys[i]
-        b0, b1, b2, b3 = record[1] * y, record[4] * y, record[7] * y, record[10] * y
-        base = b * y
-        for j in range(TILE):
-            x = xs[j]
-            value = (a * x + base) + c
-            nearer = (value > depth[i, j]) & (value <= limit)
-            nearer &= ((a0 * x + b0) + c0 >= _ZERO) & ((a1 * x + b1) + c1 >= _ZERO)
-            nearer &= ((a2 * x + b2) + c2 >= _ZERO) & ((a3 * x + b3) + c3 >= _ZERO)
-            depth[i, j] = value if nearer else depth[i, j]
-            seen[i, j] = number if nearer else seen[i, j]
+    a0, a1, a2, a3 = facets[f, 0], facets[f, 3], facets[f, 6], facets[f, 9]
+    b0, b1, b2, b3 = facets[f, 1], facets[f, 4], facets[f, 7], facets[f, 10]
+    c0, c1, c2, c3 = facets[f, 2], facets[f, 5], facets[f, 8], facets[f, 11]
+    for k in range(PIXELS):
+        x, y = lanes[X + k], lanes[Y + k]
+        value = (a * x + b * y) + c
+        nearer = (value > lanes[DEPTH + k]) & (value <= limit)
+        nearer &= ((a0 * x + b0 * y) + c0 >= _ZERO) & ((a1 * x + b1 * y) + c1 >= _ZERO)
+        nearer &= ((a2 * x + b2 * y) + c2 >= _ZERO) & ((a3 * x + b3 * y) + c3 >= _ZERO)
+        lanes[DEPTH + k] = value if nearer else lanes[DEPTH + k]
+        seen[k] = number if nearer else seen[k]
     return floor
 
 
 @_jit
-def fill_triangle(record, first_row, last_row, number, tile, limit):
-    """Draw the rows `first_row`..`last_row` (of this tile) of a triangle's record, see `raster_setup`."""
-    xs, ys, depth, seen = tile.xs, tile.ys, tile.depth, tile.seen
-    a0, a1, a2, a = record[0], record[3], record[6], record[9]
-    c0, c1, c2, c = record[2], record[5], record[8], record[11]
-    for i in range(first_row, last_row + 1):
-        y = ys[i]
-        b0, b1, b2, base = record[1] * y, record[4] * y, record[7] * y, record[10] * y
-        for j in range(TILE):
-            x = xs[j]
-            value = (a * x + base) + c
-            nearer = (value > depth[i, j]) & (value <= limit)
-            nearer &= ((a0 * x + b0) + c0 >= _ZERO) & ((a1 * x + b1) + c1 >= _ZERO) & ((a2 * x + b2) + c2 >= _ZERO)
-            depth[i, j] = value if nearer else depth[i, j]
-            seen[i, j] = number if nearer else seen[i, j]
+def fill_triangle(triangles, t, first_row, last_row, number, lanes, seen, limit):
+    """Draw the rows `first_row`..`last_row` (of this tile) of triangle `t`, see `raster_setup`."""
+    a0, a1, a2, a = triangles[t, 0], triangles[t, 3], triangles[t, 6], triangles[t, 9]
+    b0, b1, b2, b = triangles[t, 1], triangles[t, 4], triangles[t, 7], triangles[t, 10]
+    c0, c1, c2, c = triangles[t, 2], triangles[t, 5], triangles[t, 8], triangles[t, 11]
+    for k in range(np.uint64(TILE * first_row), np.uint64(TILE * (last_row + 1))):
+        x, y = lanes[X + k], lanes[Y + k]
+        value = (a * x + b * y) + c
+        nearer = (value > lanes[DEPTH + k]) & (value <= limit)
+        nearer &= (a0 * x + b0 * y) + c0 >= _ZERO
+        nearer &= ((a1 * x + b1 * y) + c1 >= _ZERO) & ((a2 * x + b2 * y) + c2 >= _ZERO)
+        lanes[DEPTH + k] = value if nearer else lanes[DEPTH + k]
+        seen[k] = number if nearer else seen[k]
 
 
 @_jit
-def fill_cylinder(record, number, tile, near):
-    """Draw an upright cylinder: side, top and bottom bear the numbers `number`, + 1 and + 2.
+def fill_cylinder(rounds, n, number, lanes, seen, near):
+    """Draw upright cylinder `n`: side, top and bottom bear the numbers `number`, + 1 and + 2.
 
     A level camera sees every vertical line of the side at one depth and every row of an end at one depth.
     """
-    xs, ys, depth, seen = tile.xs, tile.ys, tile.depth, tile.seen
-    x, z, radius, top, bottom = record[0], record[1], record[2], record[3], record[4]
-    column, low, high = tile.column, tile.low, tile.high
-    for j in range(TILE):
-        ray = np.float64(xs[j])
+    x, z, radius, top, bottom = rounds[n, 0], rounds[n, 1], rounds[n, 2], rounds[n, 3], rounds[n, 4]
+    for j in range(np.uint64(TILE)):
+        ray = np.float64(lanes[X + j])
         a, b = ray * ray + 1.0, ray * x + z
         miss = ray * z - x
         inner = a * radius * radius - miss * miss
-        column[j] = _NOWHERE
+        lanes[COLUMN + j], lanes[LOW + j], lanes[HIGH + j] = _NOWHERE, _ZERO, _ZERO
         if inner > 0.0:
             root = math.sqrt(inner)
             distance = (b - root) / a if b - root >= near * a else (b + root) / a
             if distance >= near:
-                column[j] = 1.0 / distance
-                low[j], high[j] = top / distance, bottom / distance
+                lanes[COLUMN + j] = 1.0 / distance
+                lanes[LOW + j], lanes[HIGH + j] = top / distance, bottom / distance
     for i in range(TILE):
-        y = ys[i]
-        for j in range(TILE):
-            nearer = (column[j] > depth[i, j]) & (y >= low[j]) & (y <= high[j])
-            depth[i, j] = column[j] if nearer else depth[i, j]
-            seen[i, j] = number if nearer else seen[i, j]
+        row = np.uint64(TILE * i)
+        y = lanes[Y + row]
+        for j in range(np.uint64(TILE)):
+            k = row + j
+            value = lanes[COLUMN + j]
+            nearer = (value > lanes[DEPTH + k]) & (y >= lanes[LOW + j]) & (y <= lanes[HIGH + j])
+            lanes[DEPTH + k] = value if nearer else lanes[DEPTH + k]
+            seen[k] = number if nearer else seen[k]
     for end in range(2):
-        if record[6 + end] == 0.0:
+        if rounds[n, 6 + end] == 0.0:
             continue
-        level = record[3 + end]
+        level, other = rounds[n, 3 + end], np.int32(number + 1 + end)
         for i in range(TILE):
-            inverse = ys[i] / level
+            row = np.uint64(TILE * i)
+            inverse = np.float64(lanes[Y + row]) / level
             if inverse <= 0.0 or inverse * near > 1.0:
                 continue
             ahead = 1.0 - z * inverse
             room = np.float32(radius * radius * inverse * inverse - ahead * ahead)
             value, middle = np.float32(inverse), np.float32(x * inverse)
-            for j in range(TILE):
-                nearer = (value > depth[i, j]) & ((xs[j] - middle) * (xs[j] - middle) <= room)
-                depth[i, j] = value if nearer else depth[i, j]
-                seen[i, j] = number + np.int32(1 + end) if nearer else seen[i, j]
+            for j in range(np.uint64(TILE)):
+                k = row + j
+                aside = lanes[X + j] - middle
+                nearer = (value > lanes[DEPTH + k]) & (aside * aside <= room)
+                lanes[DEPTH + k] = value if nearer else lanes[DEPTH + k]
+                seen[k] = other if nearer else seen[k]

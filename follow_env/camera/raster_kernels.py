@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numba.core import event
 
-from follow_env.camera.raster_fill import TILE, fill_cylinder, fill_facet, fill_triangle
+from follow_env.camera.raster_fill import DEPTH, PLANES, TILE, clear, fill_cylinder, fill_facet, fill_triangle
 from follow_env.camera.raster_scene import CYLINDER_PARTS, FACES, ScenePack
 from follow_env.camera.raster_setup import (
     FACET_NUMBERS,
@@ -20,7 +20,7 @@ from follow_env.camera.raster_setup import (
     find_facets,
     find_triangles,
 )
-from follow_env.camera.raster_shade import shade_row
+from follow_env.camera.raster_shade import BACKGROUND, shade_surface, shade_triangle
 
 
 class View(NamedTuple):
@@ -60,32 +60,12 @@ class PeoplePack(NamedTuple):
     starts: np.ndarray
 
 
-class Tile(NamedTuple):
-    """The pixels of one tile: rays, buffers, and rows of 16 lanes for the shading."""
-
-    xs: np.ndarray
-    ys: np.ndarray
-    depth: np.ndarray
-    seen: np.ndarray
-    column: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    px: np.ndarray
-    py: np.ndarray
-    pz: np.ndarray
-    nx: np.ndarray
-    ny: np.ndarray
-    s: np.ndarray
-    t: np.ndarray
-    sharpness: np.ndarray
-    shade: np.ndarray
-    light: np.ndarray
-
-
 class Workspace(NamedTuple):
     """Buffers of one thread, used again for every picture."""
 
-    tile: Tile
+    lanes: np.ndarray
+    seen: np.ndarray
+    colours: np.ndarray
     corners: np.ndarray
     quad: np.ndarray
     bounds: np.ndarray
@@ -93,6 +73,7 @@ class Workspace(NamedTuple):
     places: np.ndarray
     order: np.ndarray
     row: np.ndarray
+    done: np.ndarray
     rounds: np.ndarray
     round_places: np.ndarray
     camera_points: np.ndarray
@@ -111,9 +92,10 @@ def make_workspace(scene: ScenePack, vertices: int, faces: int) -> Workspace:
     def whole(*shape: int) -> np.ndarray:
         return np.zeros(shape, np.int32)
 
-    lanes = [real(TILE) for _ in range(13)]
     return Workspace(
-        Tile(real(TILE), real(TILE), real(TILE, TILE), whole(TILE, TILE), *lanes),
+        real(PLANES * TILE * TILE),
+        whole(TILE * TILE),
+        np.zeros(TILE * TILE, np.uint32),
         np.zeros((8, 3)),
         np.zeros((4, 3)),
         np.zeros(4),
@@ -121,6 +103,7 @@ def make_workspace(scene: ScenePack, vertices: int, faces: int) -> Workspace:
         whole(facets, 5),
         whole(facets),
         whole(facets),
+        whole(TILE * TILE),
         np.zeros((rounds, 8)),
         whole(rounds, 5),
         np.zeros((vertices, 3)),
@@ -204,52 +187,94 @@ def _sort_into_tiles(triangles, view, places):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True, error_model="numpy")
 def _fill_tile(row, column, view, scene, work, count, rounds, starts, entries):  # type: ignore[no-untyped-def]
-    tile = work.tile
-    background = np.float32(1.0 / view.far)
-    limit = np.float32(1.0 / view.near)
-    for k in range(TILE):
-        tile.xs[k] = view.left + (column * TILE + k) * view.step
-        tile.ys[k] = view.top + (row * TILE + k) * view.step
-    for i in range(TILE):
-        for j in range(TILE):
-            tile.depth[i, j] = background
-            tile.seen[i, j] = 0
+    """Find what the pixels of a tile see among the first `count` facets of `work.row`, cylinders and triangles."""
+    lanes, seen = work.lanes, work.seen
+    background, limit = np.float32(1.0 / view.far), np.float32(1.0 / view.near)
+    left, top = view.left + column * TILE * view.step, view.top + row * TILE * view.step
+    clear(lanes, seen, left, top, view.step, background)
+    facets, places, order = work.facets, work.places, work.row
     floor = background
     for k in range(count):
-        f = work.row[k]
-        if work.places[f, 1] <= column <= work.places[f, 2]:
-            floor = fill_facet(work.facets[f], work.places[f, 0], tile, limit, floor)
-    first = np.int32(1 + FACES * scene.boxes.shape[0])
+        f = order[k]
+        if places[f, 1] <= column <= places[f, 2]:
+            floor = fill_facet(facets, f, places[f, 0], lanes, seen, limit, floor)
+    first = 1 + FACES * scene.boxes.shape[0]
+    cylinders, places = work.rounds, work.round_places
     for k in range(rounds):
-        place = work.round_places[k]
-        inside = place[1] <= column <= place[2] and place[3] <= row <= place[4]
-        if inside and work.rounds[k, 5] > floor:
-            fill_cylinder(work.rounds[k], first + np.int32(CYLINDER_PARTS * place[0]), tile, view.near)
-    first = np.int32(scene.surfaces.shape[0])
+        inside = places[k, 1] <= column <= places[k, 2] and places[k, 3] <= row <= places[k, 4]
+        if inside and cylinders[k, 5] > floor:
+            fill_cylinder(cylinders, k, np.int32(first + CYLINDER_PARTS * places[k, 0]), lanes, seen, view.near)
+    first = scene.surfaces.shape[0]
+    triangles, places = work.triangles, work.triangle_places
     n = row * view.columns + column
     for k in range(starts[n], starts[n + 1]):
         t = entries[k]
-        upper = max(work.triangle_places[t, 3] - row * TILE, 0)
-        lower = min(work.triangle_places[t, 4] - row * TILE, TILE - 1)
-        fill_triangle(work.triangles[t], upper, lower, first + np.int32(t), tile, limit)
+        upper, lower = max(places[t, 3] - row * TILE, 0), min(places[t, 4] - row * TILE, TILE - 1)
+        fill_triangle(triangles, t, upper, lower, np.int32(first + t), lanes, seen, limit)
+
+
+@njit(nogil=True, error_model="numpy")
+def _colour_tile(height, width, view, scene, people, work):  # type: ignore[no-untyped-def]
+    """Write the colours of the first `height` rows and `width` columns of a tile into `work.colours`.
+
+    The rows are searched for a surface not yet shaded; it is shaded from there to the last row that shows it.
+    """
+    lanes, seen, colours, triangles, places = work.lanes, work.seen, work.colours, work.triangles, work.triangle_places
+    pattern, albedo = people.pattern, people.colours
+    surfaces, textures, lamps, ambient = scene.surfaces, scene.textures, scene.lamps, scene.ambient
+    static = surfaces.shape[0]
+    done, number_done = work.done, 0
+    for i in range(height):
+        for j in range(width):
+            k = np.uint64(i * TILE + j)
+            number = seen[k]
+            if number >= static:
+                t = number - static
+                f = places[t, 0]
+                red, green, blue = albedo[f, 0], albedo[f, 1], albedo[f, 2]
+                colours[k] = shade_triangle(k, t, pattern[f], red, green, blue, triangles, lanes)
+                continue
+            if number == 0:
+                colours[k] = BACKGROUND
+                continue
+            known = False
+            for n in range(number_done):
+                known |= done[n] == number
+            if known:
+                continue
+            done[number_done] = number
+            number_done += 1
+            last = i
+            for m in range(i * TILE, height * TILE):
+                if seen[np.uint64(m)] == number:
+                    last = m // TILE
+            start, stop = np.uint64(i * TILE), np.uint64((last + 1) * TILE)
+            texture = textures[number]
+            shade_surface(number, start, stop, view, surfaces, texture, lamps, ambient, lanes, seen, colours)
 
 
 @njit(nogil=True, error_model="numpy")
 def _write_tile(row, column, view, scene, people, work, coloured, rgb, depth, ids):  # type: ignore[no-untyped-def]
-    tile = work.tile
+    """Copy a tile to the picture."""
+    lanes, seen, colours, places, names = work.lanes, work.seen, work.colours, work.triangle_places, people.ids
     x0, y0 = column * TILE, row * TILE
     width, height = min(TILE, view.width - x0), min(TILE, view.height - y0)
     static = scene.surfaces.shape[0]
     far = np.float32(view.far)
     for i in range(height):
         for j in range(width):
-            number = tile.seen[i, j]
-            depth[y0 + i, x0 + j] = np.float32(1.0) / tile.depth[i, j] if number else far
-            ids[y0 + i, x0 + j] = 0
-            if number >= static:
-                ids[y0 + i, x0 + j] = people.ids[work.triangle_places[number - static, 0]]
-        if coloured:
-            shade_row(i, width, view, scene, people, work, rgb[y0 + i, x0 : x0 + width])
+            k = np.uint64(TILE * i + j)
+            number = seen[k]
+            depth[y0 + i, x0 + j] = np.float32(1.0) / lanes[DEPTH + k] if number else far
+            ids[y0 + i, x0 + j] = names[places[number - static, 0]] if number >= static else 0
+    if coloured:
+        _colour_tile(height, width, view, scene, people, work)
+        for i in range(height):
+            for j in range(width):
+                colour = colours[np.uint64(TILE * i + j)]
+                rgb[y0 + i, x0 + j, 0] = np.uint8(colour)
+                rgb[y0 + i, x0 + j, 1] = np.uint8(colour >> np.uint32(8))
+                rgb[y0 + i, x0 + j, 2] = np.uint8(colour >> np.uint32(16))
 
 
 draw = _compiled(_digest())

@@ -2,7 +2,7 @@
 
 Camera frame: X right, Y down, Z forward along the optical axis; the camera is level. A pixel looks along the ray
 (X, Y, 1), and a plane n . P = d is seen at 1/Z = (nx X + ny Y + nz) / d: affine in the picture, exact everywhere.
-An edge from P to Q splits the picture by the sign of (Q x P) . (X, Y, 1), also when an end lies behind the camera, so
+An edge from P to Q splits the picture by the sign of (P x Q) . (X, Y, 1), also when an end lies behind the camera, so
 nothing has to be cut at the near plane. Neighbours see the same edge with exactly opposite signs: no cracks.
 """
 
@@ -11,11 +11,12 @@ import math
 import numpy as np
 from numba import njit
 
+from follow_env.camera.raster_shade import lamp_light
+
 FACET_NUMBERS = 16
 """Columns of a facet's record: four edges of three coefficients, then the three of 1/Z, then the greatest 1/Z."""
 TRIANGLE_NUMBERS = 24
 """Columns of a triangle's: three edges, 1/Z, light/Z, and the three anchor coordinates/Z, of three coefficients each."""
-BLACK = np.float32(0.0)
 _CORNERS = np.array([[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4, 6, 7, 5]], np.int64)
 """Corners of the faces -x, +x, -y, +y, -z, +z, clockwise seen from outside; bit k of a corner is the sign of axis k."""
 
@@ -73,7 +74,7 @@ def find_facets(view, boxes, work):
     """
     ex, ey, ez, c, s, near, far = view.x, view.y, view.z, view.cosine, view.sine, view.near, view.far
     reach = near * math.sqrt(1.0 + view.wide ** 2 + view.high ** 2)
-    corners, quad, bounds = work.corners, work.quad, work.bounds
+    corners, quad, bounds, facets, place = work.corners, work.quad, work.bounds, work.facets, work.places
     count = 0
     for b in range(boxes.shape[0]):
         dx, dy, dz = boxes[b, 0] - ex, boxes[b, 1] - ey, boxes[b, 2] - ez
@@ -106,27 +107,24 @@ def find_facets(view, boxes, work):
             ty0, ty1 = tile_range(bounds[2], bounds[3], view.top, view.step, view.rows)
             if tx0 > tx1 or ty0 > ty1 or tx0 >= view.columns or ty0 >= view.rows:
                 continue
-            _edges(quad, 4, 1.0 if height > 0.0 else -1.0, work.facets, count)
-            _plane(quad, work.facets, count)
-            work.facets[count, 15] = nearest
-            place = work.places
+            for i in range(4):
+                p, q = (i, (i + 1) % 4) if height > 0.0 else ((i + 1) % 4, i)
+                _edge(quad[p, 0], quad[p, 1], quad[p, 2], quad[q, 0], quad[q, 1], quad[q, 2], facets, count, 3 * i)
+            _plane(quad, facets, count)
+            facets[count, 15] = nearest
             place[count, 0], place[count, 1], place[count, 2] = 1 + 6 * b + face, tx0, tx1
             place[count, 3], place[count, 4] = ty0, ty1
             count += 1
-    _sort(work, count)
+    _sort(facets, work.order, count)
     return count
 
 
 @_jit
-def _edges(corners, count, sign, records, row):
-    """Write the coefficients of the edges of a polygon given clockwise as seen from the camera (sign 1), or not (-1)."""
-    for i in range(count):
-        k = i + 1 if i + 1 < count else 0
-        px, py, pz = corners[i, 0], corners[i, 1], corners[i, 2]
-        qx, qy, qz = corners[k, 0], corners[k, 1], corners[k, 2]
-        records[row, 3 * i] = sign * (py * qz - pz * qy)
-        records[row, 3 * i + 1] = sign * (pz * qx - px * qz)
-        records[row, 3 * i + 2] = sign * (px * qy - py * qx)
+def _edge(px, py, pz, qx, qy, qz, records, row, column):
+    """Write P x Q: the edge from P to Q of a polygon that is clockwise in the picture has its inside where it is > 0."""
+    records[row, column] = py * qz - pz * qy
+    records[row, column + 1] = pz * qx - px * qz
+    records[row, column + 2] = px * qy - py * qx
 
 
 @_jit
@@ -140,9 +138,8 @@ def _plane(quad, records, row):
 
 
 @_jit
-def _sort(work, count):
-    """Sort the order of the facets by their greatest 1/Z, descending, into `work.order`."""
-    order, facets = work.order, work.facets
+def _sort(facets, order, count):
+    """Write the facets' numbers into `order` by their greatest 1/Z, descending."""
     for i in range(count):
         k = i
         while k > 0 and facets[order[k - 1], 15] < facets[i, 15]:
@@ -198,48 +195,46 @@ def find_triangles(view, people, scene, work):
     is interpolated over the triangle in perspective.
     """
     near = view.near
-    vertices, faces = people.vertices, people.faces
+    vertices, faces, anchors, pattern = people.vertices, people.faces, people.anchors, people.pattern
+    points, light, records, place = work.camera_points, work.vertex_light, work.triangles, work.triangle_places
     corners, bounds = work.quad, work.bounds
     count = 0
     for person in range(people.starts.shape[0] - 1):
         first, last = people.starts[person, 0], people.starts[person + 1, 0]
-        ahead = _to_camera(view, vertices, first, last, work.camera_points)
+        ahead = _to_camera(view, vertices, first, last, points)
         if ahead < 0:
             return -1
         if ahead == 0:
             continue
-        _light_vertices(people, first, last, scene, work.vertex_light)
+        _light_vertices(vertices, people.normals, first, last, scene.lamps, scene.ambient, light)
         for f in range(people.starts[person, 1], people.starts[person + 1, 1]):
-            behind = False
-            for i in range(3):
-                for m in range(3):
-                    corners[i, m] = work.camera_points[faces[f, i], m]
-                behind |= corners[i, 2] < near
-            record = work.triangles
-            _edges(corners, 3, -1.0, record, count)
-            volume = -(
-                corners[0, 0] * (corners[1, 1] * corners[2, 2] - corners[1, 2] * corners[2, 1])
-                + corners[0, 1] * (corners[1, 2] * corners[2, 0] - corners[1, 0] * corners[2, 2])
-                + corners[0, 2] * (corners[1, 0] * corners[2, 1] - corners[1, 1] * corners[2, 0])
-            )
+            i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+            ax, ay, az = points[i, 0], points[i, 1], points[i, 2]
+            bx, by, bz = points[j, 0], points[j, 1], points[j, 2]
+            cx, cy, cz = points[k, 0], points[k, 1], points[k, 2]
+            volume = (ax * (bz * cy - by * cz) + ay * (bx * cz - bz * cx)) + az * (by * cx - bx * cy)
             if volume <= 0.0:
                 continue
-            if behind:
+            if min(az, bz, cz) >= near:
+                u0, v0, u1, v1, u2, v2 = ax / az, ay / az, bx / bz, by / bz, cx / cz, cy / cz
+                x0, x1, y0, y1 = min(u0, u1, u2), max(u0, u1, u2), min(v0, v1, v2), max(v0, v1, v2)
+            else:
+                for m in range(3):
+                    corners[0, m], corners[1, m], corners[2, m] = points[i, m], points[j, m], points[k, m]
                 if not polygon_bounds(corners, 3, near, bounds):
                     continue
                 x0, x1, y0, y1 = bounds[0], bounds[1], bounds[2], bounds[3]
-            else:
-                u0, v0 = corners[0, 0] / corners[0, 2], corners[0, 1] / corners[0, 2]
-                u1, v1 = corners[1, 0] / corners[1, 2], corners[1, 1] / corners[1, 2]
-                u2, v2 = corners[2, 0] / corners[2, 2], corners[2, 1] / corners[2, 2]
-                x0, x1, y0, y1 = min(u0, u1, u2), max(u0, u1, u2), min(v0, v1, v2), max(v0, v1, v2)
-            place = work.triangle_places
             if not _pixels(x0, x1, view.left, view.step, view.width, place, count, 1):
                 continue
             if not _pixels(y0, y1, view.top, view.step, view.height, place, count, 3):
                 continue
             place[count, 0] = f
-            _interpolants(f, volume, people, work, count)
+            _edge(bx, by, bz, ax, ay, az, records, count, 0)
+            _edge(cx, cy, cz, bx, by, bz, records, count, 3)
+            _edge(ax, ay, az, cx, cy, cz, records, count, 6)
+            _interpolate(i, j, k, volume, light, records, count)
+            if pattern[f]:
+                _interpolate_anchors(i, j, k, volume, anchors, records, count)
             count += 1
     return count
 
@@ -259,20 +254,13 @@ def _to_camera(view, vertices, first, last, points):
 
 
 @_jit
-def _light_vertices(people, first, last, scene, light):
+def _light_vertices(vertices, normals, first, last, lamps, ambient, light):
     for i in range(first, last):
-        light[i] = scene.ambient
-    for n in range(scene.lamps.shape[0]):
-        for i in range(first, last):
-            light[i] += lamp_light(
-                scene.lamps[n, 0] - people.vertices[i, 0],
-                scene.lamps[n, 1] - people.vertices[i, 1],
-                scene.lamps[n, 2] - people.vertices[i, 2],
-                people.normals[i, 0],
-                people.normals[i, 1],
-                people.normals[i, 2],
-                scene.lamps[n, 3],
-            )
+        total = ambient
+        for n in range(lamps.shape[0]):
+            dx, dy, dz = lamps[n, 0] - vertices[i, 0], lamps[n, 1] - vertices[i, 1], lamps[n, 2] - vertices[i, 2]
+            total += lamp_light(dx, dy, dz, normals[i, 0], normals[i, 1], normals[i, 2], lamps[n, 3])
+        light[i] = total
 
 
 @_jit
@@ -287,34 +275,18 @@ def _pixels(low, high, first, step, size, place, row, column):
 
 
 @_jit
-def _interpolants(f, volume, people, work, row):
-    """Write the planes of 1/Z, light/Z and, for patterned faces, anchors/Z: edge i belongs to the corner opposite."""
-    record, faces = work.triangles, people.faces
+def _interpolate(i, j, k, volume, light, records, row):
+    """Write the planes of 1/Z and light/Z: the edge opposite to a corner, over the volume, is its share over Z."""
     for m in range(3):
-        # Edge 0 runs from corner 0 to 1, so it measures corner 2, and so on.
-        e2, e0, e1 = record[row, m] / volume, record[row, 3 + m] / volume, record[row, 6 + m] / volume
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        record[row, 9 + m] = e0 + e1 + e2
-        record[row, 12 + m] = e0 * work.vertex_light[a] + e1 * work.vertex_light[b] + e2 * work.vertex_light[c]
-        if people.pattern[f]:
-            for k in range(3):
-                record[row, 15 + 3 * k + m] = (
-                    e0 * people.anchors[a, k] + e1 * people.anchors[b, k] + e2 * people.anchors[c, k]
-                )
-
-
-_SOFT = np.float32(0.05)
-_BOUNCE, _DIRECT = np.float32(0.35), np.float32(0.65)
-_ONE = np.float32(1.0)
+        a, b, c = records[row, 3 + m] / volume, records[row, 6 + m] / volume, records[row, m] / volume
+        records[row, 9 + m] = (a + b) + c
+        records[row, 12 + m] = (a * light[i] + b * light[j]) + c * light[k]
 
 
 @_jit
-def lamp_light(dx, dy, dz, nx, ny, nz, strength):
-    """Return the light of one lamp at the offset (dx, dy, dz) m from a surface with this normal.
-
-    It falls with the squared distance (kept finite near the lamp); 65 % of it follows Lambert's law and 35 % stands for
-    what comes back from the walls.
-    """
-    q = _ONE / math.sqrt(((dx * dx + dy * dy) + dz * dz) + _SOFT)
-    facing = max(((nx * dx + ny * dy) + nz * dz) * q, BLACK)
-    return strength * (q * q) * (_BOUNCE + _DIRECT * facing)
+def _interpolate_anchors(i, j, k, volume, anchors, records, row):
+    """Write the planes of the three anchor coordinates over Z."""
+    for m in range(3):
+        a, b, c = records[row, 3 + m] / volume, records[row, 6 + m] / volume, records[row, m] / volume
+        for n in range(3):
+            records[row, 15 + 3 * n + m] = (a * anchors[i, n] + b * anchors[j, n]) + c * anchors[k, n]

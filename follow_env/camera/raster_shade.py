@@ -5,110 +5,111 @@ import math
 import numpy as np
 from numba import njit
 
-from follow_env.camera.raster_fill import TILE
-from follow_env.camera.raster_setup import lamp_light
+from follow_env.camera.raster_fill import (
+    DEPTH,
+    LIGHT,
+    NORMAL_X,
+    NORMAL_Y,
+    POINT_X,
+    POINT_Y,
+    POINT_Z,
+    SHADE,
+    TILE,
+    S,
+    T,
+    X,
+    Y,
+)
 from follow_env.camera.textures import paint
 
+BACKGROUND = np.uint32(178 + 256 * 178 + 65536 * 204)
+"""Colour of a pixel that sees nothing, as TinyRenderer's: red + 256 green + 65536 blue."""
+SOFT = np.float32(0.3)
+"""Added to the squared distance to a lamp, m^2: a lamp is no point."""
+BOUNCE, DIRECT = np.float32(0.35), np.float32(0.65)
+"""Shares of a lamp's light that come back from the walls and that follow Lambert's law."""
 _ZERO, _ONE, _ROUND, _FULL = np.float32(0.0), np.float32(1.0), np.float32(0.5), np.float32(255.0)
 _STRIPE, _CHECK, _DARK = np.float32(1 / 0.045), np.float32(1 / 0.07), np.float32(0.55)
 _SHIFT = np.float32(1024.0)
-BACKGROUND = (np.uint8(178), np.uint8(178), np.uint8(204))
-"""Colour of a pixel that sees nothing, as TinyRenderer's."""
 
 _jit = njit(nogil=True, error_model="numpy")
 
 
 @_jit
-def shade_row(i, width, view, scene, people, work, colour):
-    """Colour the first `width` pixels of row i of the tile into `colour` (width, 3) uint8.
+def lamp_light(dx, dy, dz, nx, ny, nz, strength):
+    """Return the light of one lamp at the offset (dx, dy, dz) m from a surface with this unit normal."""
+    q = _ONE / math.sqrt(((dx * dx + dy * dy) + dz * dz) + SOFT)
+    facing = max(((nx * dx + ny * dy) + nz * dz) * q, _ZERO)
+    return strength * (q * q) * (BOUNCE + DIRECT * facing)
 
-    Neighbours that see the same surface are shaded together, 16 lanes at a time.
+
+@_jit
+def shade_surface(number, first, last, view, surfaces, texture, lamps, ambient, lanes, seen, colours):
+    """Colour the pixels `first` <= k < `last` (uint64, whole rows) that see surface `number` of the scene.
+
+    All pixels of the range are shaded as if they saw it, and those that do are kept.
     """
-    tile = work.tile
-    seen, depth, light = tile.seen, tile.depth, tile.light
-    surfaces = scene.surfaces
-    static = np.int32(surfaces.shape[0])
-    start = 0
-    while start < width:
-        number = seen[i, start]
-        stop = start + 1
-        while stop < width and seen[i, stop] == number:
-            stop += 1
-        if number == 0:
-            for j in range(start, stop):
-                colour[j, 0], colour[j, 1], colour[j, 2] = BACKGROUND
-        elif number < static:
-            _light_lanes(i, surfaces[number], scene.textures[number], view, scene, tile)
-            red, green, blue = surfaces[number, 13], surfaces[number, 14], surfaces[number, 15]
-            for j in range(start, stop):
-                colour[j, 0], colour[j, 1], colour[j, 2] = (
-                    _byte(red * light[j]),
-                    _byte(green * light[j]),
-                    _byte(blue * light[j]),
-                )
-        else:
-            k = number - static
-            face = work.triangle_places[k, 0]
-            record = work.triangles[k]
-            red, green, blue = people.colours[face, 0], people.colours[face, 1], people.colours[face, 2]
-            y = tile.ys[i]
-            for j in range(start, stop):
-                x, distance = tile.xs[j], _FULL / depth[i, j]
-                value = max((record[12] * x + record[13] * y + record[14]) * distance, _ZERO)
-                if people.pattern[face]:
-                    value *= _pattern(people.pattern[face], record, x, y, _ONE / depth[i, j])
-                colour[j, 0], colour[j, 1], colour[j, 2] = _byte(red * value), _byte(green * value), _byte(blue * value)
-        start = stop
-
-
-@_jit
-def _light_lanes(i, surface, texture, view, scene, tile):
-    """Write light times texture, in units of 1/255, of the row's 16 pixels as if all saw `surface` into `tile.light`."""
-    px, py, pz, light = tile.px, tile.py, tile.pz, tile.light
-    nx, ny = tile.nx, tile.ny
     ex, ey, ez = np.float32(view.x), np.float32(view.y), np.float32(view.z)
-    c, s, y = np.float32(view.cosine), np.float32(view.sine), tile.ys[i]
-    focal = np.float32(1.0 / view.step)
-    bend, nz = surface[3], surface[2]
-    side = ((surface[0] * ex + surface[1] * ey) + nz * ez) - surface[4]
-    sign = -_ONE if bend == _ZERO and side < _ZERO else _ONE
-    nz *= sign
-    for j in range(TILE):
-        distance = _ONE / tile.depth[i, j]
-        px[j] = ex + distance * (c + s * tile.xs[j])
-        py[j] = ey + distance * (s - c * tile.xs[j])
-        pz[j] = ez - distance * y
-        nx[j] = sign * (surface[0] + bend * px[j])
-        ny[j] = sign * (surface[1] + bend * py[j])
-        light[j] = scene.ambient
-    for n in range(scene.lamps.shape[0]):
-        lx, ly, lz, strength = scene.lamps[n, 0], scene.lamps[n, 1], scene.lamps[n, 2], scene.lamps[n, 3]
-        for j in range(TILE):
-            light[j] += lamp_light(lx - px[j], ly - py[j], lz - pz[j], nx[j], ny[j], nz, strength)
+    c, s = np.float32(view.cosine), np.float32(view.sine)
+    n0, n1, n2, bend = surfaces[number, 0], surfaces[number, 1], surfaces[number, 2], surfaces[number, 3]
+    if bend == _ZERO and ((n0 * ex + n1 * ey) + n2 * ez) - surfaces[number, 4] < _ZERO:
+        n0, n1, n2 = -n0, -n1, -n2
+    for k in range(first, last):
+        distance = _ONE / lanes[DEPTH + k]
+        px = ex + distance * (c + s * lanes[X + k])
+        py = ey + distance * (s - c * lanes[X + k])
+        lanes[POINT_X + k], lanes[POINT_Y + k] = px, py
+        lanes[POINT_Z + k] = ez - distance * lanes[Y + k]
+        lanes[NORMAL_X + k], lanes[NORMAL_Y + k] = n0 + bend * px, n1 + bend * py
+        lanes[LIGHT + k] = ambient
+    for n in range(lamps.shape[0]):
+        lx, ly, lz, strength = lamps[n, 0], lamps[n, 1], lamps[n, 2], lamps[n, 3]
+        for k in range(first, last):
+            dx, dy, dz = lx - lanes[POINT_X + k], ly - lanes[POINT_Y + k], lz - lanes[POINT_Z + k]
+            lanes[LIGHT + k] += lamp_light(dx, dy, dz, lanes[NORMAL_X + k], lanes[NORMAL_Y + k], n2, strength)
     if texture:
-        for j in range(TILE):
-            tile.s[j] = ((surface[5] * px[j] + surface[6] * py[j]) + surface[7] * pz[j]) + surface[8]
-            tile.t[j] = ((surface[9] * px[j] + surface[10] * py[j]) + surface[11] * pz[j]) + surface[12]
-            tile.sharpness[j] = focal * tile.depth[i, j]
-        paint(texture, tile.s, tile.t, tile.sharpness, tile.shade)
-        for j in range(TILE):
-            light[j] *= tile.shade[j]
-    for j in range(TILE):
-        light[j] *= _FULL
+        s0, s1, s2, s3 = surfaces[number, 5], surfaces[number, 6], surfaces[number, 7], surfaces[number, 8]
+        t0, t1, t2, t3 = surfaces[number, 9], surfaces[number, 10], surfaces[number, 11], surfaces[number, 12]
+        for k in range(first, last):
+            px, py, pz = lanes[POINT_X + k], lanes[POINT_Y + k], lanes[POINT_Z + k]
+            lanes[S + k] = ((s0 * px + s1 * py) + s2 * pz) + s3
+            lanes[T + k] = ((t0 * px + t1 * py) + t2 * pz) + t3
+        paint(texture, first, last, np.float32(1.0 / view.step), lanes)
+        for k in range(first, last):
+            lanes[LIGHT + k] *= lanes[SHADE + k]
+    red, green, blue = (
+        _FULL * surfaces[number, 13],
+        _FULL * surfaces[number, 14],
+        _FULL * surfaces[number, 15],
+    )
+    for k in range(first, last):
+        light = lanes[LIGHT + k]
+        colour = _colour(red * light, green * light, blue * light)
+        colours[k] = colour if seen[k] == number else colours[k]
 
 
 @_jit
-def _byte(value):
-    return np.uint8(np.int32(min(value + _ROUND, _FULL)))
+def shade_triangle(k, t, kind, red, green, blue, triangles, lanes):
+    """Return the colour of pixel k (uint64), which sees triangle t of this pattern and albedo."""
+    x, y, distance = lanes[X + k], lanes[Y + k], _ONE / lanes[DEPTH + k]
+    light = max((triangles[t, 12] * x + triangles[t, 13] * y + triangles[t, 14]) * distance, _ZERO) * _FULL
+    if kind:
+        az = (triangles[t, 21] * x + triangles[t, 22] * y + triangles[t, 23]) * distance
+        if kind == 1:
+            odd = np.int32(az * _STRIPE + _SHIFT)
+        else:
+            ax = (triangles[t, 15] * x + triangles[t, 16] * y + triangles[t, 17]) * distance
+            ay = (triangles[t, 18] * x + triangles[t, 19] * y + triangles[t, 20]) * distance
+            odd = np.int32(ax * _CHECK + _SHIFT) + np.int32(ay * _CHECK + _SHIFT) + np.int32(az * _CHECK + _SHIFT)
+        if odd & 1:
+            light *= _DARK
+    return _colour(red * light, green * light, blue * light)
 
 
 @_jit
-def _pattern(kind, record, x, y, distance):
-    """Return the brightness of a patterned shirt at the anchor point under the pixel."""
-    az = (record[21] * x + record[22] * y + record[23]) * distance
-    if kind == 1:
-        return _DARK if np.int32(az * _STRIPE + _SHIFT) & np.int32(1) else _ONE
-    ax = (record[15] * x + record[16] * y + record[17]) * distance
-    ay = (record[18] * x + record[19] * y + record[20]) * distance
-    cells = np.int32(ax * _CHECK + _SHIFT) + np.int32(ay * _CHECK + _SHIFT) + np.int32(az * _CHECK + _SHIFT)
-    return _DARK if cells & np.int32(1) else _ONE
+def _colour(red, green, blue):
+    """Pack three numbers >= 0, cut at 255 and rounded, as red + 256 green + 65536 blue."""
+    r = np.int32(min(red, _FULL) + _ROUND)
+    g = np.int32(min(green, _FULL) + _ROUND)
+    b = np.int32(min(blue, _FULL) + _ROUND)
+    return np.uint32(r | np.int32(g << np.int32(8)) | np.int32(b << np.int32(16)))

@@ -1,4 +1,4 @@
-"""Procedural textures: brightness of a surface from its own coordinates, one row of pixels at a time.
+"""Procedural textures: brightness of a surface from its own coordinates, for the pixels of a tile.
 
 The patterns are built from cells and integer hashes, so they need no picture files and are the same on every machine.
 Where a cell is smaller than about two pixels its contrast fades, so that distant surfaces do not shimmer.
@@ -7,10 +7,11 @@ Where a cell is smaller than about two pixels its contrast fades, so that distan
 import numpy as np
 from numba import njit
 
+from follow_env.camera.raster_fill import DEPTH, SHADE, S, T
+
 TEXTURES = ("plain", "tiles", "wood", "brick", "carpet", "spines")
 """Names for `Material.texture`; the kernels know them by their place."""
 
-LANES = 16
 _ZERO, _ONE, _HALF, _TWO = np.float32(0.0), np.float32(1.0), np.float32(0.5), np.float32(2.0)
 _SHIFT = np.float32(4096.0)
 _BYTE = np.float32(1.0 / 255.0)
@@ -25,29 +26,26 @@ _jit = njit(nogil=True, error_model="numpy")
 
 
 @_jit
-def paint(texture, s, t, sharpness, shade):
-    """Write the brightness factor of 16 surface points into `shade`.
+def paint(texture, first, last, focal, lanes):
+    """Write the brightness factor of the pixels `first` <= k < `last` (uint64) into plane `SHADE`.
 
     Args:
-        texture: index into `TEXTURES`.
-        s: (16,) float32, first surface coordinate, m, within 4 km of 0 in cells.
-        t: (16,) float32, second surface coordinate, m.
-        sharpness: (16,) float32, pixels per metre on the surface.
-        shade: (16,) float32, out.
+        texture: index into `TEXTURES`, not 0.
+        first: first pixel.
+        last: the pixel after the last.
+        focal: focal length, px; times 1/Z it is the number of pixels per metre on a surface that faces the camera.
+        lanes: the tile; its planes `S` and `T` are the surface coordinates, m.
     """
     if texture == 1:
-        _tiles(s, t, sharpness, shade)
+        _tiles(first, last, focal, lanes)
     elif texture == 2:
-        _wood(s, t, sharpness, shade)
+        _wood(first, last, focal, lanes)
     elif texture == 3:
-        _brick(s, t, sharpness, shade)
+        _brick(first, last, focal, lanes)
     elif texture == 4:
-        _carpet(s, t, sharpness, shade)
-    elif texture == 5:
-        _spines(s, sharpness, shade)
+        _carpet(first, last, focal, lanes)
     else:
-        for j in range(LANES):
-            shade[j] = _ONE
+        _spines(first, last, focal, lanes)
 
 
 @_jit
@@ -65,49 +63,49 @@ def _cell(x):
 
 
 @_jit
-def _tiles(s, t, sharpness, shade):
-    for j in range(LANES):
-        a, b = s[j] * _TILE, t[j] * _TILE
-        i, k = _cell(a), _cell(b)
-        fa, fb = a - np.float32(i), b - np.float32(k)
-        body = _ONE + _TILE_VARIETY * (_hash(i, k) - _HALF)
+def _tiles(first, last, focal, lanes):
+    for k in range(first, last):
+        a, b = lanes[S + k] * _TILE, lanes[T + k] * _TILE
+        i, m = _cell(a), _cell(b)
+        fa, fb = a - np.float32(i), b - np.float32(m)
+        body = _ONE + _TILE_VARIETY * (_hash(i, m) - _HALF)
         joint = (fa < _GROUT) | (fb < _GROUT)
-        fade = min(_ONE, sharpness[j] * (_GROUT / _TILE))
-        shade[j] = body + fade * ((_GROUT_SHADE if joint else body) - body)
+        fade = min(_ONE, lanes[DEPTH + k] * focal * (_GROUT / _TILE))
+        lanes[SHADE + k] = body + fade * ((_GROUT_SHADE if joint else body) - body)
 
 
 @_jit
-def _wood(s, t, sharpness, shade):
-    for j in range(LANES):
-        wave = s[j] * _BOARD
+def _wood(first, last, focal, lanes):
+    for k in range(first, last):
+        wave = lanes[S + k] * _BOARD
         wave = abs(wave - np.float32(_cell(wave)) - _HALF)
-        fade = min(_ONE, sharpness[j] * (_HALF / _GRAIN))
-        shade[j] = _ONE + fade * _GRAIN_VARIETY * (_hash(_cell(t[j] * _GRAIN + _WARP * wave), np.int32(7)) - _HALF)
+        fade = min(_ONE, lanes[DEPTH + k] * focal * (_HALF / _GRAIN))
+        lanes[SHADE + k] = _ONE + fade * _GRAIN_VARIETY * (_hash(_cell(lanes[T + k] * _GRAIN + _WARP * wave), np.int32(7)) - _HALF)
 
 
 @_jit
-def _brick(s, t, sharpness, shade):
-    for j in range(LANES):
-        b = t[j] * _COURSE
-        k = _cell(b)
-        a = s[j] * _BRICK + _HALF * np.float32(k & np.int32(1))
+def _brick(first, last, focal, lanes):
+    for k in range(first, last):
+        b = lanes[T + k] * _COURSE
+        m = _cell(b)
+        a = lanes[S + k] * _BRICK + _HALF * np.float32(m & np.int32(1))
         i = _cell(a)
-        fa, fb = a - np.float32(i), b - np.float32(k)
-        body = _ONE + _BRICK_VARIETY * (_hash(i, k) - _HALF)
+        fa, fb = a - np.float32(i), b - np.float32(m)
+        body = _ONE + _BRICK_VARIETY * (_hash(i, m) - _HALF)
         joint = (fa < _BRICK_JOINT) | (fb < _MORTAR)
-        fade = min(_ONE, sharpness[j] * (_MORTAR / _COURSE))
-        shade[j] = _ONE + fade * ((_TWO - _HALF if joint else body) - _ONE)
+        fade = min(_ONE, lanes[DEPTH + k] * focal * (_MORTAR / _COURSE))
+        lanes[SHADE + k] = _ONE + fade * ((_TWO - _HALF if joint else body) - _ONE)
 
 
 @_jit
-def _carpet(s, t, sharpness, shade):
-    for j in range(LANES):
-        fade = min(_ONE, sharpness[j] * (_HALF / _TUFT))
-        shade[j] = _ONE + fade * _TUFT_VARIETY * (_hash(_cell(s[j] * _TUFT), _cell(t[j] * _TUFT)) - _HALF)
+def _carpet(first, last, focal, lanes):
+    for k in range(first, last):
+        fade = min(_ONE, lanes[DEPTH + k] * focal * (_HALF / _TUFT))
+        lanes[SHADE + k] = _ONE + fade * _TUFT_VARIETY * (_hash(_cell(lanes[S + k] * _TUFT), _cell(lanes[T + k] * _TUFT)) - _HALF)
 
 
 @_jit
-def _spines(s, sharpness, shade):
-    for j in range(LANES):
-        fade = min(_ONE, sharpness[j] * (_HALF / _SPINE))
-        shade[j] = _ONE + fade * _SPINE_VARIETY * (_hash(_cell(s[j] * _SPINE), np.int32(3)) - _HALF)
+def _spines(first, last, focal, lanes):
+    for k in range(first, last):
+        fade = min(_ONE, lanes[DEPTH + k] * focal * (_HALF / _SPINE))
+        lanes[SHADE + k] = _ONE + fade * _SPINE_VARIETY * (_hash(_cell(lanes[S + k] * _SPINE), np.int32(3)) - _HALF)

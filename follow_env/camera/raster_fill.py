@@ -12,12 +12,12 @@ from numba import njit
 
 TILE = 16
 PIXELS = np.uint64(TILE * TILE)
-# Planes of a tile: the pixel's ray, 1/Z, the surface point and its normal, texture coordinates, and light.
-X, Y, DEPTH, POINT_X, POINT_Y, POINT_Z, NORMAL_X, NORMAL_Y, S, T, SHADE, LIGHT, COLUMN = np.arange(
-    0, 13 * TILE * TILE, TILE * TILE, dtype=np.uint64
+# Planes of a tile: the pixel's ray, 1/Z, the surface point and its normal, texture coordinates, pixels per metre, and light.
+X, Y, DEPTH, POINT_X, POINT_Y, POINT_Z, NORMAL_X, NORMAL_Y, S, T, SHARP, SHADE, LIGHT, COLUMN = np.arange(
+    0, 14 * TILE * TILE, TILE * TILE, dtype=np.uint64
 )
 LOW, HIGH = COLUMN + np.uint64(TILE), COLUMN + np.uint64(2 * TILE)
-PLANES = 13
+PLANES = 14
 _ZERO = np.float32(0.0)
 _NOWHERE = np.float32(-1.0)
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from follow_env.camera.raster_shade import SOFT
 from follow_env.camera.textures import TEXTURES
 from follow_env.config import choose
 from follow_env.scene import Box, Material, Scene
@@ -26,8 +27,8 @@ class ScenePack(NamedTuple):
             texture axes s (3 + 1) and t (3 + 1), albedo (3); row 0 stands for nothing, then six rows a box and three a
             cylinder.
         textures: (S,) uint8, index into `TEXTURES`.
-        lamps: (L, 4) float32, position (m) and strength: intensity times the squared height above 1 m, which is where
-            `Scene.illumination` is measured.
+        lamps: (L, 4) float32, position (m) and strength, such that a surface that faces the lamp 1 m above the floor
+            right below it gets its intensity, as in `Scene.illumination`.
         ambient: ambient light.
     """
 
@@ -64,8 +65,10 @@ def pack_scene(scene: Scene) -> ScenePack:
             axis, sign = face // 2, 2 * (face % 2) - 1
             normal = [sign * value for value in frame[axis]]
             offset = sum(n * m for n, m in zip(normal, box.centre, strict=True)) + 0.5 * box.size[axis]
-            across, along = (frame[k] for k in range(3) if k != axis)
-            add(box.material, box.centre, [*normal, 0.0, offset], (across, along))
+            first, second = (k for k in range(3) if k != axis)
+            if box.material.texture == "wood" and box.size[first] < box.size[second]:
+                first, second = second, first  # the grain runs along the longer side
+            add(box.material, box.centre, [*normal, 0.0, offset], (frame[first], frame[second]))
     for cylinder in cylinders:
         x, y, z = cylinder.centre
         bend, half = 1.0 / cylinder.radius, 0.5 * cylinder.height
@@ -79,9 +82,7 @@ def pack_scene(scene: Scene) -> ScenePack:
         _table([[*c.centre[:2], c.centre[2] - c.height / 2, c.centre[2] + c.height / 2, c.radius] for c in cylinders], 5),
         _table(surfaces, 16).astype(np.float32),
         np.array(textures, np.uint8),
-        _table([[*lamp.position, lamp.intensity * (lamp.position[2] - 1.0) ** 2] for lamp in scene.lights], 4).astype(
-            np.float32
-        ),
+        _table([[*m.position, m.intensity * ((m.position[2] - 1.0) ** 2 + SOFT)] for m in scene.lights], 4).astype(np.float32),
         np.float32(scene.ambient),
     )
     for name, array in pack._asdict().items():

@@ -14,7 +14,7 @@ from follow_env.camera.raster_fill import (
     POINT_Y,
     POINT_Z,
     SHADE,
-    TILE,
+    SHARP,
     S,
     T,
     X,
@@ -24,9 +24,9 @@ from follow_env.camera.textures import paint
 
 BACKGROUND = np.uint32(178 + 256 * 178 + 65536 * 204)
 """Colour of a pixel that sees nothing, as TinyRenderer's: red + 256 green + 65536 blue."""
-SOFT = np.float32(0.3)
+SOFT = np.float32(1.0)
 """Added to the squared distance to a lamp, m^2: a lamp is no point."""
-BOUNCE, DIRECT = np.float32(0.35), np.float32(0.65)
+BOUNCE, DIRECT = np.float32(0.25), np.float32(0.75)
 """Shares of a lamp's light that come back from the walls and that follow Lambert's law."""
 _ZERO, _ONE, _ROUND, _FULL = np.float32(0.0), np.float32(1.0), np.float32(0.5), np.float32(255.0)
 _STRIPE, _CHECK, _DARK = np.float32(1 / 0.045), np.float32(1 / 0.07), np.float32(0.55)
@@ -52,8 +52,9 @@ def shade_surface(number, first, last, view, surfaces, texture, lamps, ambient, 
     ex, ey, ez = np.float32(view.x), np.float32(view.y), np.float32(view.z)
     c, s = np.float32(view.cosine), np.float32(view.sine)
     n0, n1, n2, bend = surfaces[number, 0], surfaces[number, 1], surfaces[number, 2], surfaces[number, 3]
-    if bend == _ZERO and ((n0 * ex + n1 * ey) + n2 * ez) - surfaces[number, 4] < _ZERO:
-        n0, n1, n2 = -n0, -n1, -n2
+    height = ((n0 * ex + n1 * ey) + n2 * ez) - surfaces[number, 4] if bend == _ZERO else np.float32(view.far)
+    if height < _ZERO:
+        n0, n1, n2, height = -n0, -n1, -n2, -height
     for k in range(first, last):
         distance = _ONE / lanes[DEPTH + k]
         px = ex + distance * (c + s * lanes[X + k])
@@ -70,18 +71,16 @@ def shade_surface(number, first, last, view, surfaces, texture, lamps, ambient, 
     if texture:
         s0, s1, s2, s3 = surfaces[number, 5], surfaces[number, 6], surfaces[number, 7], surfaces[number, 8]
         t0, t1, t2, t3 = surfaces[number, 9], surfaces[number, 10], surfaces[number, 11], surfaces[number, 12]
+        focal = np.float32(1.0 / view.step)
         for k in range(first, last):
             px, py, pz = lanes[POINT_X + k], lanes[POINT_Y + k], lanes[POINT_Z + k]
             lanes[S + k] = ((s0 * px + s1 * py) + s2 * pz) + s3
             lanes[T + k] = ((t0 * px + t1 * py) + t2 * pz) + t3
-        paint(texture, first, last, np.float32(1.0 / view.step), lanes)
+            lanes[SHARP + k] = focal * lanes[DEPTH + k] * min(height * lanes[DEPTH + k], _ONE)
+        paint(texture, first, last, lanes)
         for k in range(first, last):
             lanes[LIGHT + k] *= lanes[SHADE + k]
-    red, green, blue = (
-        _FULL * surfaces[number, 13],
-        _FULL * surfaces[number, 14],
-        _FULL * surfaces[number, 15],
-    )
+    red, green, blue = _FULL * surfaces[number, 13], _FULL * surfaces[number, 14], _FULL * surfaces[number, 15]
     for k in range(first, last):
         light = lanes[LIGHT + k]
         colour = _colour(red * light, green * light, blue * light)

@@ -1,21 +1,24 @@
-"""`RasterRenderer`: the default camera. Boxes, cylinders and people in one z-buffer, compiled by numba, no system library.
+"""`RasterRenderer`: the default camera. Boxes, cylinders and people in one z-buffer, compiled by numba.
 
-Flat faces are half-planes and a linear 1/Z over the picture, cylinders are solved per column, people are triangles; the
-nearest at a pixel centre wins, and each visible pixel is shaded once. See `raster_setup`, `raster_fill`, `raster_shade`.
+Flat faces are half-planes and a linear 1/Z over the picture, cylinders are solved per column, people are triangles. The
+nearest at a pixel centre wins, and each visible pixel is shaded once. The rooms: `raster_scene` packs the scene,
+`raster_setup` and `raster_people` find what may be seen, `raster_fill` draws tiles, `raster_shade` colours them.
 """
 
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 
 import numpy as np
 
 from follow_env.camera.frame import RGBDFrame
-from follow_env.camera.mesh import Placed
+from follow_env.camera.mesh import Mesh, Placed
 from follow_env.camera.pinhole import CameraPose, PinholeCamera
 from follow_env.camera.raster_fill import TILE
-from follow_env.camera.raster_kernels import PeoplePack, View, Workspace, announced, draw, halve, make_workspace
+from follow_env.camera.raster_kernels import announced, draw, halve
 from follow_env.camera.raster_scene import pack_scene
+from follow_env.camera.raster_work import PeoplePack, View, Workspace, make_workspace
 from follow_env.scene import Scene
 
 
@@ -43,7 +46,7 @@ class RasterRenderer:
         self._camera, self._supersample, self._threads = camera, supersample, threads
         self._scene = pack_scene(scene)
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
-        self._meshes: list[tuple[object, int]] = []
+        self._meshes: list[tuple[Mesh, int]] = []
         self._people, self._workspaces = self._pack_people(())
         shape = (camera.height * 2, camera.width * 2) if supersample == 2 else (0, 0)
         self._fine = RGBDFrame(np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32), np.empty(shape, np.uint8))
@@ -83,13 +86,14 @@ class RasterRenderer:
         return RGBDFrame(np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32), np.empty(shape, np.uint8))
 
     def _render_into(self, frame: RGBDFrame, camera: CameraPose, people: Sequence[Placed]) -> None:
+        view = self._view(camera, 1)
         self._place(people)
-        if self._supersample == 2:
-            self._draw(self._view(camera, 2), True, self._fine)
-            halve(self._fine.rgb, frame.rgb)
-            self._draw(self._view(camera, 1), False, frame)
-        else:
-            self._draw(self._view(camera, 1), True, frame)
+        with nullcontext() if self._warm else announced():
+            if self._supersample == 2:
+                self._draw(self._view(camera, 2), True, self._fine)
+                halve(self._fine.rgb, frame.rgb)
+            self._draw(view, self._supersample == 1, frame)
+        self._warm = True
 
     def _view(self, pose: CameraPose, scale: int) -> View:
         if not all(map(math.isfinite, (pose.x, pose.y, pose.z, pose.yaw))):
@@ -102,8 +106,8 @@ class RasterRenderer:
             float(pose.z),
             math.cos(pose.yaw),
             math.sin(pose.yaw),
-            camera.config.near,
-            camera.config.far,
+            float(camera.config.near),
+            float(camera.config.far),
             0.5 * width * step,
             0.5 * height * step,
             (0.5 - 0.5 * width) * step,
@@ -158,13 +162,9 @@ class RasterRenderer:
             (view, self._scene, self._people, work, first, last, coloured, frame.rgb, frame.depth, frame.ids)
             for work, first, last in zip(self._workspaces, edges[:-1], edges[1:], strict=True)
         ]
-        if not self._warm:
-            with announced():
-                states = [draw(*job) for job in jobs]
-            self._warm = True
-        elif self._pool is None:
-            states = [draw(*jobs[0])]
-        else:
+        if self._pool is not None and self._warm:
             states = list(self._pool.map(lambda job: draw(*job), jobs))
+        else:
+            states = [draw(*job) for job in jobs]
         if min(states) < 0:
             raise ValueError("a person has a vertex that is not finite; expected world coordinates in metres")

@@ -1,7 +1,8 @@
+# mypy: disable-error-code="no-untyped-def"
 """Kernels that decide, within one tile of 16 x 16 pixels, what is nearest at every pixel centre.
 
 A tile is one flat float32 array of planes of 256 numbers, `lanes[PLANE + 16 * row + column]`, beside `seen` (256,)
-int32, the number of the surface at each pixel. Plane `DEPTH` holds 1/Z; nearer means greater, and the first drawn wins a
+int32, the number of the surface at each pixel. Plane `DEPTH` holds 1/Z; nearer means greater, the first drawn wins a
 tie. All pixels are computed and tested alike, one array and no branch, so that the compiler uses vector instructions.
 """
 
@@ -12,7 +13,7 @@ from numba import njit
 
 TILE = 16
 PIXELS = np.uint64(TILE * TILE)
-# Planes of a tile: the pixel's ray, 1/Z, the surface point and its normal, texture coordinates, pixels per metre, and light.
+# Planes of a tile: the pixel's ray, 1/Z, surface point, normal, texture coordinates, pixels per metre, and light.
 X, Y, DEPTH, POINT_X, POINT_Y, POINT_Z, NORMAL_X, NORMAL_Y, S, T, SHARP, SHADE, LIGHT, COLUMN = np.arange(
     0, 14 * TILE * TILE, TILE * TILE, dtype=np.uint64
 )
@@ -30,9 +31,9 @@ def clear(lanes, seen, left, top, step, background):
     for i in range(TILE):
         y = np.float32(top + i * step)
         for j in range(TILE):
-            k = np.uint64(TILE * i + j)
-            lanes[X + k] = left + j * step
-            lanes[Y + k] = y
+            pixel = np.uint64(TILE * i + j)
+            lanes[X + pixel] = left + j * step
+            lanes[Y + pixel] = y
     for k in range(PIXELS):
         lanes[DEPTH + k] = background
         seen[k] = 0

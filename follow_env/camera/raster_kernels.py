@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """The compiled picture: `draw` goes through the tiles of a picture, `halve` averages 2 x 2 pixels."""
 
 import sys
@@ -5,112 +6,17 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numba.core import event
 
-from follow_env.camera.raster_fill import DEPTH, PLANES, TILE, clear, fill_cylinder, fill_facet, fill_triangle
-from follow_env.camera.raster_scene import CYLINDER_PARTS, FACES, ScenePack
-from follow_env.camera.raster_setup import (
-    FACET_NUMBERS,
-    TRIANGLE_NUMBERS,
-    find_cylinders,
-    find_facets,
-    find_triangles,
-)
+from follow_env.camera.raster_fill import DEPTH, TILE, clear, fill_cylinder, fill_facet, fill_triangle
+from follow_env.camera.raster_people import find_triangles
+from follow_env.camera.raster_scene import CYLINDER_PARTS, FACES
+from follow_env.camera.raster_setup import find_cylinders, find_facets
 from follow_env.camera.raster_shade import BACKGROUND, shade_surface, shade_triangle
-
-
-class View(NamedTuple):
-    """A camera: place (m), cosine and sine of the yaw, clipping (m), slopes of the field of view's edges, pixel grid.
-
-    The ray (X, Y, 1) of pixel (i, j) is (left + j step, top + i step, 1).
-    """
-
-    x: float
-    y: float
-    z: float
-    cosine: float
-    sine: float
-    near: float
-    far: float
-    wide: float
-    high: float
-    left: float
-    top: float
-    step: float
-    width: int
-    height: int
-    columns: int
-    rows: int
-
-
-class PeoplePack(NamedTuple):
-    """All people of a picture as one mesh; `starts` (P + 1, 2) are the first vertex and face of each."""
-
-    vertices: np.ndarray
-    normals: np.ndarray
-    faces: np.ndarray
-    colours: np.ndarray
-    pattern: np.ndarray
-    anchors: np.ndarray
-    ids: np.ndarray
-    starts: np.ndarray
-
-
-class Workspace(NamedTuple):
-    """Buffers of one thread, used again for every picture."""
-
-    lanes: np.ndarray
-    seen: np.ndarray
-    colours: np.ndarray
-    corners: np.ndarray
-    quad: np.ndarray
-    bounds: np.ndarray
-    facets: np.ndarray
-    places: np.ndarray
-    order: np.ndarray
-    row: np.ndarray
-    done: np.ndarray
-    rounds: np.ndarray
-    round_places: np.ndarray
-    camera_points: np.ndarray
-    vertex_light: np.ndarray
-    triangles: np.ndarray
-    triangle_places: np.ndarray
-
-
-def make_workspace(scene: ScenePack, vertices: int, faces: int) -> Workspace:
-    """Return buffers for `scene` and people of so many vertices and faces in all."""
-    facets, rounds = FACES * len(scene.boxes), len(scene.cylinders)
-
-    def real(*shape: int) -> np.ndarray:
-        return np.zeros(shape, np.float32)
-
-    def whole(*shape: int) -> np.ndarray:
-        return np.zeros(shape, np.int32)
-
-    return Workspace(
-        real(PLANES * TILE * TILE),
-        whole(TILE * TILE),
-        np.zeros(TILE * TILE, np.uint32),
-        np.zeros((8, 3)),
-        np.zeros((4, 3)),
-        np.zeros(4),
-        real(facets, FACET_NUMBERS),
-        whole(facets, 5),
-        whole(facets),
-        whole(facets),
-        whole(TILE * TILE),
-        np.zeros((rounds, 8)),
-        whole(rounds, 5),
-        np.zeros((vertices, 3)),
-        real(vertices),
-        real(faces + 1, TRIANGLE_NUMBERS),
-        whole(faces + 1, 5),
-    )
 
 
 def _digest() -> int:
@@ -127,7 +33,7 @@ def _digest() -> int:
 
 def _compiled(sources: int) -> Callable[..., int]:
     @njit(cache=True, nogil=True, error_model="numpy")
-    def draw(view, scene, people, work, first_row, last_row, coloured, rgb, depth, ids):  # type: ignore[no-untyped-def]
+    def draw(view, scene, people, work, first_row, last_row, coloured, rgb, depth, ids):
         """Draw the rows of tiles `first_row` <= row < `last_row`; return 0, or -1 if a vertex is not finite.
 
         Args:
@@ -142,7 +48,7 @@ def _compiled(sources: int) -> Callable[..., int]:
             depth: (H, W) float32, out, m.
             ids: (H, W) uint8, out.
         """
-        assert sources >= 0
+        key = sources  # noqa: F841  captured, hence part of the cache key
         facets = find_facets(view, scene.boxes, work)
         rounds = find_cylinders(view, scene.cylinders, work)
         triangles = find_triangles(view, people, scene, work)
@@ -165,7 +71,7 @@ def _compiled(sources: int) -> Callable[..., int]:
 
 
 @njit(nogil=True, error_model="numpy")
-def _sort_into_tiles(triangles, view, places):  # type: ignore[no-untyped-def]
+def _sort_into_tiles(triangles, view, places):
     """Return (starts, entries): the triangles of tile n are entries[starts[n] : starts[n + 1]]."""
     columns = view.columns
     starts = np.zeros(view.rows * columns + 2, np.int32)
@@ -186,7 +92,7 @@ def _sort_into_tiles(triangles, view, places):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, error_model="numpy")
-def _fill_tile(row, column, view, scene, work, count, rounds, starts, entries):  # type: ignore[no-untyped-def]
+def _fill_tile(row, column, view, scene, work, count, rounds, starts, entries):
     """Find what the pixels of a tile see among the first `count` facets of `work.row`, cylinders and triangles."""
     lanes, seen = work.lanes, work.seen
     background, limit = np.float32(1.0 / view.far), np.float32(1.0 / view.near)
@@ -214,7 +120,7 @@ def _fill_tile(row, column, view, scene, work, count, rounds, starts, entries): 
 
 
 @njit(nogil=True, error_model="numpy")
-def _colour_tile(height, width, view, scene, people, work):  # type: ignore[no-untyped-def]
+def _colour_tile(height, width, view, scene, people, work):
     """Write the colours of the first `height` rows and `width` columns of a tile into `work.colours`.
 
     The rows are searched for a surface not yet shaded; it is shaded from there to the last row that shows it.
@@ -254,7 +160,7 @@ def _colour_tile(height, width, view, scene, people, work):  # type: ignore[no-u
 
 
 @njit(nogil=True, error_model="numpy")
-def _write_tile(row, column, view, scene, people, work, coloured, rgb, depth, ids):  # type: ignore[no-untyped-def]
+def _write_tile(row, column, view, scene, people, work, coloured, rgb, depth, ids):
     """Copy a tile to the picture."""
     lanes, seen, colours, places, names = work.lanes, work.seen, work.colours, work.triangle_places, people.ids
     x0, y0 = column * TILE, row * TILE
@@ -281,7 +187,7 @@ draw = _compiled(_digest())
 
 
 @njit(cache=True, nogil=True)
-def halve(fine, rgb):  # type: ignore[no-untyped-def]
+def halve(fine, rgb):
     """Average 2 x 2 pixels of `fine` (2 H, 2 W, 3) uint8 into `rgb` (H, W, 3) uint8, rounded."""
     for i in range(rgb.shape[0]):
         for j in range(rgb.shape[1]):

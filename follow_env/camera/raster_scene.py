@@ -8,7 +8,7 @@ import numpy as np
 from follow_env.camera.raster_shade import SOFT
 from follow_env.camera.textures import TEXTURES
 from follow_env.config import choose
-from follow_env.scene import Box, Material, Scene
+from follow_env.scene import Box, Light, Material, Scene
 
 FLOOR_THICKNESS = 0.1
 FACES = 6
@@ -74,21 +74,25 @@ def pack_scene(scene: Scene) -> ScenePack:
         bend, half = 1.0 / cylinder.radius, 0.5 * cylinder.height
         around = (math.sqrt(0.5), math.sqrt(0.5), 0.0)
         add(cylinder.material, cylinder.centre, [-x * bend, -y * bend, 0.0, bend, 0.0], (around, (0.0, 0.0, 1.0)))
-        for sign in (1.0, -1.0):
-            flat = [0.0, 0.0, sign, 0.0, sign * z + half]
+        for up in (1.0, -1.0):
+            flat = [0.0, 0.0, up, 0.0, up * z + half]
             add(cylinder.material, cylinder.centre, flat, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
     pack = ScenePack(
         _table([[*b.centre, *(0.5 * v for v in b.size), math.cos(b.yaw), math.sin(b.yaw)] for b in boxes], 8),
-        _table([[*c.centre[:2], c.centre[2] - c.height / 2, c.centre[2] + c.height / 2, c.radius] for c in cylinders], 5),
+        _table([[x, y, z - c.height / 2, z + c.height / 2, c.radius] for c in cylinders for x, y, z in [c.centre]], 5),
         _table(surfaces, 16).astype(np.float32),
         np.array(textures, np.uint8),
-        _table([[*m.position, m.intensity * ((m.position[2] - 1.0) ** 2 + SOFT)] for m in scene.lights], 4).astype(np.float32),
+        _table([_lamp(m) for m in scene.lights], 4).astype(np.float32),
         np.float32(scene.ambient),
     )
     for name, array in pack._asdict().items():
         if not np.isfinite(array).all():
-            raise ValueError(f"the scene {scene.name!r} has {name} that are not finite; expected finite numbers in metres")
+            raise ValueError(f"the scene {scene.name!r} has {name} that are not finite; expected finite metres")
     return pack
+
+
+def _lamp(light: Light) -> list[float]:
+    return [*light.position, light.intensity * ((light.position[2] - 1.0) ** 2 + float(SOFT))]
 
 
 def _axis(axis: tuple[float, float, float], origin: tuple[float, float, float]) -> list[float]:

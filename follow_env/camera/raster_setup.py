@@ -1,4 +1,5 @@
-"""Kernels that prepare a picture: which flat facets, cylinders and triangles may be seen, and where.
+# mypy: disable-error-code="no-untyped-def"
+"""Kernels that prepare a picture: which flat facets and cylinders may be seen, and where.
 
 Camera frame: X right, Y down, Z forward along the optical axis; the camera is level. A pixel looks along the ray
 (X, Y, 1), and a plane n . P = d is seen at 1/Z = (nx X + ny Y + nz) / d: affine in the picture, exact everywhere.
@@ -11,12 +12,10 @@ import math
 import numpy as np
 from numba import njit
 
-from follow_env.camera.raster_shade import lamp_light
+from follow_env.camera.raster_fill import TILE
 
 FACET_NUMBERS = 16
 """Columns of a facet's record: four edges of three coefficients, then the three of 1/Z, then the greatest 1/Z."""
-TRIANGLE_NUMBERS = 24
-"""Columns of a triangle's: three edges, 1/Z, light/Z, and the three anchor coordinates/Z, of three coefficients each."""
 _CORNERS = np.array([[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4, 6, 7, 5]], np.int64)
 """Corners of the faces -x, +x, -y, +y, -z, +z, clockwise seen from outside; bit k of a corner is the sign of axis k."""
 
@@ -27,9 +26,9 @@ _jit = njit(nogil=True, error_model="numpy")
 def tile_range(low, high, first, step, tiles):
     """Return the first and last tile that rays with `low` <= ray <= `high` can meet (last < first: none)."""
     start, stop = (low - first) / step, (high - first) / step
-    limit = 16.0 * tiles
+    limit = float(TILE * tiles)
     start, stop = min(max(start - 0.01, -1.0), limit), min(max(stop + 0.01, -1.0), limit)
-    return int(math.ceil(start)) // 16 if start > 0.0 else 0, int(math.floor(stop)) // 16 if stop >= 0.0 else -1
+    return math.ceil(start) // TILE if start > 0.0 else 0, math.floor(stop) // TILE if stop >= 0.0 else -1
 
 
 @_jit
@@ -60,20 +59,18 @@ def outside(x, y, z, radius, view):
     near, far, wide, high = view.near, view.far, view.wide, view.high
     if z + radius < near or z - radius > far:
         return True
-    return (
-        abs(x) - wide * z > radius * math.sqrt(1.0 + wide * wide)
-        or abs(y) - high * z > radius * math.sqrt(1.0 + high * high)
-    )
+    aside, above = abs(x) - wide * z, abs(y) - high * z
+    return aside > radius * math.sqrt(1.0 + wide * wide) or above > radius * math.sqrt(1.0 + high * high)
 
 
 @_jit
 def find_facets(view, boxes, work):
-    """Fill `work.facets` and `work.places` with the faces of the boxes that may be seen, nearest first; return how many.
+    """Fill `work.facets`, `work.places` and `work.order` with the faces of boxes that may be seen; return how many.
 
     A face turned away is left out unless the camera is so close that the near plane may cut the box open.
     """
     ex, ey, ez, c, s, near, far = view.x, view.y, view.z, view.cosine, view.sine, view.near, view.far
-    reach = near * math.sqrt(1.0 + view.wide ** 2 + view.high ** 2)
+    reach = near * math.sqrt(1.0 + view.wide**2 + view.high**2)
     corners, quad, bounds, facets, place = work.corners, work.quad, work.bounds, work.facets, work.places
     count = 0
     for b in range(boxes.shape[0]):
@@ -109,7 +106,7 @@ def find_facets(view, boxes, work):
                 continue
             for i in range(4):
                 p, q = (i, (i + 1) % 4) if height > 0.0 else ((i + 1) % 4, i)
-                _edge(quad[p, 0], quad[p, 1], quad[p, 2], quad[q, 0], quad[q, 1], quad[q, 2], facets, count, 3 * i)
+                edge(quad[p, 0], quad[p, 1], quad[p, 2], quad[q, 0], quad[q, 1], quad[q, 2], facets, count, 3 * i)
             _plane(quad, facets, count)
             facets[count, 15] = nearest
             place[count, 0], place[count, 1], place[count, 2] = 1 + 6 * b + face, tx0, tx1
@@ -120,8 +117,8 @@ def find_facets(view, boxes, work):
 
 
 @_jit
-def _edge(px, py, pz, qx, qy, qz, records, row, column):
-    """Write P x Q: the edge from P to Q of a polygon that is clockwise in the picture has its inside where it is > 0."""
+def edge(px, py, pz, qx, qy, qz, records, row, column):
+    """Write P x Q, the edge from P to Q of a polygon that is clockwise in the picture: positive inside."""
     records[row, column] = py * qz - pz * qy
     records[row, column + 1] = pz * qx - px * qz
     records[row, column + 2] = px * qy - py * qx
@@ -155,7 +152,7 @@ def find_cylinders(view, cylinders, work):
     A record is (X, Z of the axis, radius, Y of the top, Y of the bottom, greatest 1/Z, draw the top, the bottom).
     """
     ex, ey, ez, c, s, near = view.x, view.y, view.z, view.cosine, view.sine, view.near
-    reach = near * math.sqrt(1.0 + view.wide ** 2 + view.high ** 2)
+    reach = near * math.sqrt(1.0 + view.wide**2 + view.high**2)
     count = 0
     for n in range(cylinders.shape[0]):
         dx, dy = cylinders[n, 0] - ex, cylinders[n, 1] - ey
@@ -179,114 +176,10 @@ def find_cylinders(view, cylinders, work):
         if tx0 > tx1 or ty0 > ty1 or tx0 >= view.columns or ty0 >= view.rows:
             continue
         rounds, place = work.rounds, work.round_places
-        rounds[count, 0], rounds[count, 1], rounds[count, 2], rounds[count, 3], rounds[count, 4] = x, z, radius, top, bottom
+        rounds[count, 0], rounds[count, 1], rounds[count, 2] = x, z, radius
+        rounds[count, 3], rounds[count, 4] = top, bottom
         rounds[count, 5] = 1.0 / max(front, near)
         rounds[count, 6], rounds[count, 7] = top > 0.0 or cut, bottom < 0.0 or cut
         place[count, 0], place[count, 1], place[count, 2], place[count, 3], place[count, 4] = n, tx0, tx1, ty0, ty1
         count += 1
     return count
-
-
-@_jit
-def find_triangles(view, people, scene, work):
-    """Fill `work.triangles` with the triangles of people that may be seen; return how many, or -1 if one is not finite.
-
-    A triangle turned away, or that meets no pixel centre, is left out. Vertices are lit here, once each, and the light
-    is interpolated over the triangle in perspective.
-    """
-    near = view.near
-    vertices, faces, anchors, pattern = people.vertices, people.faces, people.anchors, people.pattern
-    points, light, records, place = work.camera_points, work.vertex_light, work.triangles, work.triangle_places
-    corners, bounds = work.quad, work.bounds
-    count = 0
-    for person in range(people.starts.shape[0] - 1):
-        first, last = people.starts[person, 0], people.starts[person + 1, 0]
-        ahead = _to_camera(view, vertices, first, last, points)
-        if ahead < 0:
-            return -1
-        if ahead == 0:
-            continue
-        _light_vertices(vertices, people.normals, first, last, scene.lamps, scene.ambient, light)
-        for f in range(people.starts[person, 1], people.starts[person + 1, 1]):
-            i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-            ax, ay, az = points[i, 0], points[i, 1], points[i, 2]
-            bx, by, bz = points[j, 0], points[j, 1], points[j, 2]
-            cx, cy, cz = points[k, 0], points[k, 1], points[k, 2]
-            volume = (ax * (bz * cy - by * cz) + ay * (bx * cz - bz * cx)) + az * (by * cx - bx * cy)
-            if volume <= 0.0:
-                continue
-            if min(az, bz, cz) >= near:
-                u0, v0, u1, v1, u2, v2 = ax / az, ay / az, bx / bz, by / bz, cx / cz, cy / cz
-                x0, x1, y0, y1 = min(u0, u1, u2), max(u0, u1, u2), min(v0, v1, v2), max(v0, v1, v2)
-            else:
-                for m in range(3):
-                    corners[0, m], corners[1, m], corners[2, m] = points[i, m], points[j, m], points[k, m]
-                if not polygon_bounds(corners, 3, near, bounds):
-                    continue
-                x0, x1, y0, y1 = bounds[0], bounds[1], bounds[2], bounds[3]
-            if not _pixels(x0, x1, view.left, view.step, view.width, place, count, 1):
-                continue
-            if not _pixels(y0, y1, view.top, view.step, view.height, place, count, 3):
-                continue
-            place[count, 0] = f
-            _edge(bx, by, bz, ax, ay, az, records, count, 0)
-            _edge(cx, cy, cz, bx, by, bz, records, count, 3)
-            _edge(ax, ay, az, cx, cy, cz, records, count, 6)
-            _interpolate(i, j, k, volume, light, records, count)
-            if pattern[f]:
-                _interpolate_anchors(i, j, k, volume, anchors, records, count)
-            count += 1
-    return count
-
-
-@_jit
-def _to_camera(view, vertices, first, last, points):
-    """Move vertices to the camera frame; return how many lie beyond the near plane, or -1 if one is not finite."""
-    ex, ey, ez, c, s, near = view.x, view.y, view.z, view.cosine, view.sine, view.near
-    ahead, total = 0, 0.0
-    for i in range(first, last):
-        dx, dy, dz = vertices[i, 0] - ex, vertices[i, 1] - ey, vertices[i, 2] - ez
-        points[i, 0], points[i, 1], points[i, 2] = s * dx - c * dy, -dz, c * dx + s * dy
-        total += abs(dx) + abs(dy) + abs(dz)
-        if points[i, 2] >= near:
-            ahead += 1
-    return ahead if math.isfinite(total) else -1
-
-
-@_jit
-def _light_vertices(vertices, normals, first, last, lamps, ambient, light):
-    for i in range(first, last):
-        total = ambient
-        for n in range(lamps.shape[0]):
-            dx, dy, dz = lamps[n, 0] - vertices[i, 0], lamps[n, 1] - vertices[i, 1], lamps[n, 2] - vertices[i, 2]
-            total += lamp_light(dx, dy, dz, normals[i, 0], normals[i, 1], normals[i, 2], lamps[n, 3])
-        light[i] = total
-
-
-@_jit
-def _pixels(low, high, first, step, size, place, row, column):
-    """Write the first and last pixel whose centre may lie between the rays; False if there is none."""
-    start, stop = (low - first) / step, (high - first) / step
-    if not (stop > -0.01 and start < size - 0.99):
-        return False
-    place[row, column] = int(math.ceil(max(start - 0.01, 0.0)))
-    place[row, column + 1] = int(math.floor(min(stop + 0.01, size - 1.0)))
-    return place[row, column] <= place[row, column + 1]
-
-
-@_jit
-def _interpolate(i, j, k, volume, light, records, row):
-    """Write the planes of 1/Z and light/Z: the edge opposite to a corner, over the volume, is its share over Z."""
-    for m in range(3):
-        a, b, c = records[row, 3 + m] / volume, records[row, 6 + m] / volume, records[row, m] / volume
-        records[row, 9 + m] = (a + b) + c
-        records[row, 12 + m] = (a * light[i] + b * light[j]) + c * light[k]
-
-
-@_jit
-def _interpolate_anchors(i, j, k, volume, anchors, records, row):
-    """Write the planes of the three anchor coordinates over Z."""
-    for m in range(3):
-        a, b, c = records[row, 3 + m] / volume, records[row, 6 + m] / volume, records[row, m] / volume
-        for n in range(3):
-            records[row, 15 + 3 * n + m] = (a * anchors[i, n] + b * anchors[j, n]) + c * anchors[k, n]

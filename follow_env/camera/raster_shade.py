@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Kernels that colour a tile once it is known what every pixel sees."""
 
 import math

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Procedural textures: brightness of a surface from its own coordinates, for the pixels of a tile.
 
 The patterns are built from cells and integer hashes, so they need no picture files and are the same on every machine.

@@ -55,9 +55,10 @@ def cycle(clip: str) -> dict[str, np.ndarray]:
     rotations /= np.sqrt((rotations**2).sum(axis=2, keepdims=True))
     leg = THIGH + SHIN
     pelvis = table[:, 24:26] - (0.0, table[:, 25].mean())
+    ankle = table[:, 20:23] + np.outer(pelvis[:, 1], (0.0, 0.0, 1.0))
     return {
         "rotations": rotations,
-        "ankle": (table[:, 20:23] - (0.0, 0.0, 0.0)) / leg,
+        "ankle": ankle / leg,
         "pitch": table[:, 23],
         "pelvis": pelvis / leg,
         "stride": np.float64((frames[-1, 1] - frames[0, 1]) / leg),

@@ -45,7 +45,10 @@ def cycle(clip: str) -> dict[str, np.ndarray]:
     period = len(frames) - 1
     travel = np.linspace(0.0, frames[-1, 1] - frames[0, 1], period + 1)
     sides = {"left": (30, 34, 35, 39, 43), "right": (16, 20, 21, 25, 29)}
-    tables = {side: np.array([_pose(f, t, columns) for f, t in zip(frames[:-1], travel, strict=False)]) for side, columns in sides.items()}
+    tables = {
+        side: np.array([_pose(f, t, columns) for f, t in zip(frames[:-1], travel, strict=False)])
+        for side, columns in sides.items()
+    }
     tables["right"] = _mirror(tables["right"])
     strike = int(np.argmax(tables["left"][:, 20]))
     left = _resample(np.roll(tables["left"], -strike, axis=0))
@@ -79,7 +82,12 @@ def _pose(frame: np.ndarray, travelled: float, columns: tuple[int, ...]) -> np.n
     foot = _times(shin, _turn(frame[ankle : ankle + 4]))
     sway, up = -frame[3], frame[2]
     at = np.array([frame[1] - travelled, sway, 0.0])
-    at = at + _rotate(pelvis, (0.0, side * HIP, 0.0)) + _rotate(thigh, (0.0, 0.0, -THIGH)) + _rotate(shin, (0.0, 0.0, -SHIN))
+    at = (
+        at
+        + _rotate(pelvis, (0.0, side * HIP, 0.0))
+        + _rotate(thigh, (0.0, 0.0, -THIGH))
+        + _rotate(shin, (0.0, 0.0, -SHIN))
+    )
     toes = _rotate(foot, (1.0, 0.0, 0.0))
     quaternions = [q if q[0] >= 0 else -q for q in (pelvis, chest, head, arm, forearm)]
     return np.array([*np.concatenate(quaternions), *at, math.atan2(toes[2], toes[0]), sway, up])
@@ -112,7 +120,12 @@ def _times(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     a, b, c, d = p
     e, f, g, h = q
     return np.array(
-        [a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g, a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e]
+        [
+            a * e - b * f - c * g - d * h,
+            a * f + b * e + c * h - d * g,
+            a * g - b * h + c * e + d * f,
+            a * h + b * g - c * f + d * e,
+        ]
     )
 
 

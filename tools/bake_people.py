@@ -21,7 +21,7 @@ import numpy as np
 from reduce_mesh import reduce_mesh
 
 ASSETS = Path(__file__).resolve().parents[1] / "follow_env" / "person" / "assets"
-HIGH, LOW = 3300, 1320
+HIGH, LOW = 3300, 1340
 """Triangles of the two levels of detail (hair styles make them vary a little)."""
 
 MATERIALS = ("skin", "hair", "shirt", "trousers", "shoes", "eyes")
@@ -216,7 +216,7 @@ def dress(base: Base, shapes: dict[str, np.ndarray]) -> Half:
     arm = joint["LeftForeArm"] - joint["LeftArm"]
     along = ((reference - joint["LeftArm"]) @ arm) / (arm @ arm)
     is_arm = base.weights[:, [BONES.index("Left" + b) for b in ("Arm", "ForeArm", "Hand")]].sum(axis=1) > 0.5
-    hem, waist = crotch + 0.055, crotch + 0.125
+    hem, waist = crotch + 0.055, crotch + 0.19
     ankle = joint["LeftFoot"][2]
 
     sealed, of_eye = _seal(base, reference)
@@ -227,7 +227,7 @@ def dress(base: Base, shapes: dict[str, np.ndarray]) -> Half:
     skull = [t for t in left["body"] if max((z - collar)[t]) > -0.045 and not is_arm[t].any()]
     is_eye = [bool(of_eye[t].any()) for t in skull]
     crop, bob = _hair_lines(reference, eye)
-    bare = [min(*crop[t], *bob[t]) < HIDDEN for t in skull]
+    bare = [min(*crop[t], *bob[t]) < (HIDDEN if x[t].max() > eye[0] - 0.1 else 5 * HIDDEN) for t in skull]
     cutter.add("skin", [t for t, e, b in zip(skull, is_eye, bare, strict=True) if b and not e], None, HEAD)
     cutter.add("skin", [t for t, e in zip(skull, is_eye, strict=True) if e], None, EYE)
     cutter.add("crop", skull, crop, CROP)
@@ -258,7 +258,9 @@ def dress(base: Base, shapes: dict[str, np.ndarray]) -> Half:
     clothed = [_clothed(base, p, layers, source, share, faces, depths) for p in shapes.values()]
     positions = np.stack([position for position, _ in clothed])
     shifts = np.stack([shift for _, shift in clothed])
-    importance = np.array([_importance(layer, source[i, 0], hand_weight, eye, reference) for i, layer in enumerate(layers)])
+    importance = np.array(
+        [_importance(layer, source[i, 0], hand_weight, eye, reference) for i, layer in enumerate(layers)]
+    )
     return Half(source, share, positions, shifts, faces, zones, _features(faces, zones, positions), importance)
 
 
@@ -339,12 +341,16 @@ def _clothed(
         if layer == "shirt":
             offset[i] = 0.006 + 0.012 * min(1.0, max(0.0, (hip + 0.18 - z) / 0.2)) * (abs(position[i, 1]) < 0.25)
         elif layer == "trousers":
-            offset[i] = 0.004 + 0.016 * min(1.0, max(0.0, (knee + 0.15 - z) / (knee + 0.15 - ankle)))
+            offset[i] = (
+                0.004
+                - 0.012 * min(1.0, max(0.0, (z - hip) / 0.08))
+                + 0.016 * min(1.0, max(0.0, (knee + 0.15 - z) / (knee + 0.15 - ankle)))
+            )
         elif layer == "shoe":
             offset[i] = 0.007
         elif layer in ("crop", "bob"):
             depth = min(1.0, (depths[layer][source[i]] * (1 - share[i], share[i])).sum() / 0.03)
-            offset[i] = 0.0025 + depth * (0.012 if layer == "crop" else 0.024)
+            offset[i] = 0.004 + depth * (0.012 if layer == "crop" else 0.024)
     position = position + scale * offset[:, None] * normal
     position[np.abs(points[source[:, 0], 1]) < 1e-4, 1] = 0.0
     position = _smooth_hair(position, faces, np.array([layer == "bob" for layer in layers]))
@@ -394,9 +400,13 @@ def _importance(layer: str, vertex: int, hand: np.ndarray, eye: np.ndarray, poin
         if hand[vertex] > 0.3:
             return 0.25
         if behind < 0.02 and (abs(high) < 0.015 or abs(high - 0.07) < 0.014):
-            return 25.0  # eyes and mouth
-        return 3.0 if behind < 0.05 and high < 0.1 else 0.6
-    return {"shirt": 1.0, "trousers": 1.0, "shoe": 1.0, "crop": 0.7, "bob": 0.7}[layer]
+            return 15.0  # eyes and mouth
+        if behind < -0.012 and 0.01 < high < 0.055:
+            return 15.0  # the nose
+        if 0.065 < behind < 0.13 and -0.05 < high < 0.07:
+            return 0.5  # the ear
+        return 4.0 if behind < 0.05 and high < 0.1 else 1.2
+    return {"shirt": 1.0, "trousers": 1.0, "shoe": 1.0, "crop": 1.2, "bob": 1.2}[layer]
 
 
 def _features(faces: np.ndarray, zones: np.ndarray, positions: np.ndarray) -> list[frozenset]:
@@ -430,7 +440,10 @@ def write(
     kept = [level[half.zones[level[:, 3]] != hidden] for level in levels]
     used_low = np.unique(kept[1][:, :3])
     used_high = np.setdiff1d(np.unique(kept[0][:, :3]), used_low)
-    weights = base.weights[half.source[:, 0]] * (1 - half.share[:, None]) + base.weights[half.source[:, 1]] * half.share[:, None]
+    weights = (
+        base.weights[half.source[:, 0]] * (1 - half.share[:, None])
+        + base.weights[half.source[:, 1]] * half.share[:, None]
+    )
     swap = [BONES.index(b.replace("Left", "!").replace("Right", "Left").replace("!", "Right")) for b in BONES]
     position = half.positions[index]
     vertices, skin, place = [], [], {}

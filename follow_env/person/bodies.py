@@ -1,4 +1,4 @@
-"""Bodies that are seen: skinned, clothed people read from `assets/` (see LICENCE.md there), and what they wear.
+"""Bodies that are seen: skinned, clothed people read from `assets/` (origins and licences: LICENCES.md there), and what they wear.
 
 Rest frame: origin on the floor below the pelvis, x forward, y left, z up, m.
 """
@@ -49,7 +49,9 @@ OUTFITS: dict[str, Outfit] = {
     "orange": Outfit((0.86, 0.68, 0.58), (0.45, 0.29, 0.14), (0.85, 0.45, 0.12), (0.15, 0.20, 0.34)),
     "red": Outfit((0.36, 0.23, 0.16), (0.05, 0.04, 0.04), (0.66, 0.12, 0.14), (0.42, 0.44, 0.50), (0.85, 0.85, 0.83)),
     "white": Outfit((0.74, 0.53, 0.38), (0.08, 0.07, 0.07), (0.88, 0.88, 0.86), (0.12, 0.17, 0.32)),
-    "stripes": Outfit((0.88, 0.70, 0.60), (0.62, 0.46, 0.24), (0.80, 0.80, 0.84), (0.13, 0.13, 0.15), pattern="stripes"),
+    "stripes": Outfit(
+        (0.88, 0.70, 0.60), (0.62, 0.46, 0.24), (0.80, 0.80, 0.84), (0.13, 0.13, 0.15), pattern="stripes"
+    ),
     "checks": Outfit((0.82, 0.63, 0.52), (0.50, 0.48, 0.46), (0.55, 0.20, 0.22), (0.30, 0.25, 0.18), pattern="checks"),
     "grey": Outfit((0.50, 0.33, 0.23), (0.10, 0.07, 0.05), (0.45, 0.47, 0.50), (0.30, 0.31, 0.34)),
 }
@@ -104,7 +106,9 @@ def load_body(name: str = "man", outfit: str | Outfit = "blue", detail: str = "l
     mesh = Mesh(
         faces=_frozen(arrays[f"{detail}_faces"].astype(np.int32)),
         colours=_frozen(palette[materials]),
-        pattern=_frozen(np.where(materials == MATERIALS.index("shirt"), PATTERNS.index(outfit.pattern), 0).astype(np.uint8)),
+        pattern=_frozen(
+            np.where(materials == MATERIALS.index("shirt"), PATTERNS.index(outfit.pattern), 0).astype(np.uint8)
+        ),
         anchors=_frozen(arrays["vertices"][:count].copy()),
     )
     return Body(

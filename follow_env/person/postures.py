@@ -39,7 +39,9 @@ POSTURES: dict[str, Posture] = {
         trunk={"pelvis": (20, 0, 0), "chest": (38, 0, 0), "head": (10, 0, 0)},
         left={"upper_arm": (35, 14, 0), "forearm": (85, 4, 0), "thigh": (92, 14, 0), "shin": (-42, 6, 0)},
     ),
-    "arms_raised": Posture(left={"upper_arm": (10, 158, 0), "forearm": (4, 172, 0), "thigh": (0, 4, 0), "shin": (0, 4, 0)}),
+    "arms_raised": Posture(
+        left={"upper_arm": (10, 158, 0), "forearm": (4, 172, 0), "thigh": (0, 4, 0), "shin": (0, 4, 0)}
+    ),
     "sideways": Posture(
         trunk={"pelvis": (0, -8, 0), "chest": (4, -32, 0), "head": (2, -38, 0)},
         left={"upper_arm": (4, 2, 0), "forearm": (16, 0, 0), "thigh": (0, 10, 0), "shin": (0, 10, 0)},
@@ -51,13 +53,31 @@ POSTURES: dict[str, Posture] = {
     ),
     "floating": Posture(
         trunk={"pelvis": (22, 6, 0), "chest": (32, 10, 6), "head": (14, 6, 10)},
-        left={"upper_arm": (62, 38, 0), "forearm": (92, 22, 0), "thigh": (58, 12, 0), "shin": (-18, 8, 0), "foot": (-38, 0, 0)},
-        right={"upper_arm": (44, -50, 0), "forearm": (80, -34, 0), "thigh": (38, -12, 0), "shin": (-46, -10, 0), "foot": (-55, 0, 0)},
+        left={
+            "upper_arm": (62, 38, 0),
+            "forearm": (92, 22, 0),
+            "thigh": (58, 12, 0),
+            "shin": (-18, 8, 0),
+            "foot": (-38, 0, 0),
+        },
+        right={
+            "upper_arm": (44, -50, 0),
+            "forearm": (80, -34, 0),
+            "thigh": (38, -12, 0),
+            "shin": (-46, -10, 0),
+            "foot": (-55, 0, 0),
+        },
         clearance=0.22,
     ),
     "head_down": Posture(
         trunk={"pelvis": (172, 0, 0), "chest": (176, 0, 0), "head": (168, 0, 0)},
-        left={"upper_arm": (205, 24, 0), "forearm": (225, 16, 0), "thigh": (186, 8, 0), "shin": (166, 6, 0), "foot": (140, 0, 0)},
+        left={
+            "upper_arm": (205, 24, 0),
+            "forearm": (225, 16, 0),
+            "thigh": (186, 8, 0),
+            "shin": (166, 6, 0),
+            "foot": (140, 0, 0),
+        },
         clearance=0.06,
     ),
 }
@@ -67,7 +87,9 @@ POSTURES: dict[str, Posture] = {
 def rotations(posture: Posture) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Return the rotation matrices (3, 3) of trunk, left and right segments; missing ones stand upright or hang."""
     mirrored = {name: (f, -side, -turn) for name, (f, side, turn) in (_ARMS_DOWN | posture.left).items()}
-    right = mirrored if posture.right is None else {n: (f, -s, -t) for n, (f, s, t) in _ARMS_DOWN.items()} | posture.right
+    right = (
+        mirrored if posture.right is None else {n: (f, -s, -t) for n, (f, s, t) in _ARMS_DOWN.items()} | posture.right
+    )
     return (
         {name: _swing(posture.trunk.get(name, (0, 0, 0)), trunk=True) for name in SEGMENTS[:3]},
         {name: _swing((_ARMS_DOWN | posture.left).get(name, (0, 0, 0)), trunk=False) for name in SEGMENTS[3:]},

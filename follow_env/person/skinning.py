@@ -31,7 +31,9 @@ def multiply(a: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
 
 
 @numba.njit(cache=True)
-def chain(rotations: np.ndarray, root: np.ndarray, joints: np.ndarray, parents: np.ndarray, positions: np.ndarray) -> None:
+def chain(
+    rotations: np.ndarray, root: np.ndarray, joints: np.ndarray, parents: np.ndarray, positions: np.ndarray
+) -> None:
     """Write every bone's position (J, 3) from the bones' rotations (J, 3, 3), both in the body's frame."""
     for b in range(len(parents)):
         p = parents[b]

@@ -1,6 +1,7 @@
 """Compiled gait: where every bone is at a phase of the cycle, between standing, walking and jogging.
 
-Trunk, head and arms follow the clips. The legs follow the clips in swing; in stance the foot is placed by construction,
+Trunk, head and arms follow the clips. The legs follow the clips in swing
+(lifted so that the sole clears the floor); in stance the foot is placed by construction,
 so that it does not slide: it rolls over the heel until it is flat, stands, and rolls over the toe joint, and the points
 it rolls over move back under the body by exactly what the body moves forward. Two-bone inverse kinematics gives thigh
 and shin. Phase 0 is the left foot's heel strike. Lengths in m, angles in rad, frame: x forward, y left, z up.
@@ -19,8 +20,16 @@ STRIKE_PITCH, PUSH_PITCH = 0.32, 0.74
 """Toes up at heel strike, heel up at toe-off."""
 FLAT_FROM, FLAT_UNTIL = 0.12, 0.36
 """Phases between which a foot stands flat in a walk."""
+SWING_PITCH = 0.6
+"""Share of the clips' foot pitch in swing: their skeleton's foot is shorter than a shoe."""
+SWING_WIDTH = 0.3
+"""Share of the clips' outward arc of the foot in swing."""
+SWING_LIFT = 0.05
+"""Greatest height of the swinging sole's lowest point, somewhat past mid-swing, leg lengths."""
 STANCE_CENTRE = -0.08
 """Of the ankle relative to the pelvis in mid-stance, leg lengths."""
+ARM_JOG = 1.5
+"""How much sooner than the rest the arms take the run clip's bent elbows."""
 REACH = 0.996
 """Largest share of the leg's length between hip and ankle: a knee is never quite straight."""
 
@@ -52,7 +61,9 @@ def smooth(value: float) -> float:
 
 
 @numba.njit(cache=True)
-def _stance(phase: float, duty: float, jog: float, stride: float, leg: float, foot: np.ndarray) -> tuple[float, float, float]:
+def _stance(
+    phase: float, duty: float, jog: float, stride: float, leg: float, foot: np.ndarray
+) -> tuple[float, float, float]:
     """Return ankle x, ankle z and foot pitch of a foot on the floor; `foot` holds heel and toe joint, see `Legs`."""
     flat_until = FLAT_UNTIL * duty / WALK_DUTY
     x = STANCE_CENTRE * leg - stride * (phase - 0.5 * duty)
@@ -75,24 +86,51 @@ def _stance(phase: float, duty: float, jog: float, stride: float, leg: float, fo
 def _bridge(s: float, start: float, start_slope: float, end: float, end_slope: float) -> float:
     """Return the cubic with these values and slopes at s = 0 and s = 1."""
     r = 1.0 - s
-    return start * r * r * (1.0 + 2.0 * s) + start_slope * s * r * r + end * s * s * (1.0 + 2.0 * r) - end_slope * r * s * s
+    return (
+        start * r * r * (1.0 + 2.0 * s)
+        + start_slope * s * r * r
+        + end * s * s * (1.0 + 2.0 * r)
+        - end_slope * r * s * s
+    )
 
 
 @numba.njit(cache=True)
 def _clip_foot(phase: float, jog: float, stride: float, leg: float, clips: np.ndarray, out: np.ndarray) -> None:
-    """Write ankle x, z, pitch and y of the clips' left foot, blended; clips: (2, P, 5) with the stride in the last."""
-    walk, run = np.empty(5), np.empty(5)
+    """Write ankle x, y and foot pitch of the clips' left foot, blended; clips: (2, P, 4) x, y, pitch, stride."""
+    walk, run = np.empty(4), np.empty(4)
     sample(clips[0], phase, walk)
     sample(clips[1], phase, run)
-    out[0] = leg * (1.0 - jog) * walk[0] + jog * run[0] * stride / run[4]
-    out[1] = leg * ((1.0 - jog) * walk[2] + jog * 0.4 * run[2])
-    out[2] = (1.0 - jog) * walk[3] + jog * 0.7 * run[3]
-    out[3] = leg * 0.3 * walk[1]
+    out[0] = stride * ((1.0 - jog) * walk[0] / walk[3] + jog * run[0] / run[3])
+    out[1] = SWING_WIDTH * leg * walk[1]
+    out[2] = SWING_PITCH * ((1.0 - jog) * walk[2] + jog * run[2])
+
+
+@numba.njit(cache=True)
+def _lowest(pitch: float, toe_pitch: float, sole: np.ndarray, foot: np.ndarray) -> float:
+    """Return the height of a sole's lowest point above its ankle (so it is negative); see `pose_gait`."""
+    toe_x, toe_z = foot[1], foot[2] - foot[3]
+    c, s = math.cos(pitch), math.sin(pitch)
+    ct, st = math.cos(toe_pitch), math.sin(toe_pitch)
+    joint_z = s * toe_x + c * toe_z
+    lowest = 1e9
+    for k in range(len(sole)):
+        x, z, share = sole[k, 0], sole[k, 1], sole[k, 2]
+        with_foot = s * x + c * z
+        with_toes = joint_z + st * (x - toe_x) + ct * (z - toe_z)
+        lowest = min(lowest, (1.0 - share) * with_foot + share * with_toes)
+    return lowest
 
 
 @numba.njit(cache=True)
 def _foot(
-    phase: float, jog: float, stride: float, leg: float, foot: np.ndarray, clips: np.ndarray, out: np.ndarray
+    phase: float,
+    jog: float,
+    stride: float,
+    leg: float,
+    foot: np.ndarray,
+    sole: np.ndarray,
+    clips: np.ndarray,
+    out: np.ndarray,
 ) -> None:
     """Write ankle x, z, foot pitch, toe pitch and the swing's shift outward."""
     duty = (1.0 - jog) * WALK_DUTY + jog * JOG_DUTY
@@ -104,7 +142,7 @@ def _foot(
     length = 1.0 - duty
     s = (phase - duty) / length
     step = 1e-4
-    now, lift, lift_next, land, land_next = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    now, lift, lift_next, land, land_next = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     _clip_foot(phase, jog, stride, leg, clips, now)
     _clip_foot(duty, jog, stride, leg, clips, lift)
     _clip_foot(duty + step, jog, stride, leg, clips, lift_next)
@@ -114,27 +152,13 @@ def _foot(
     leave_before = _stance(duty - step, duty, jog, stride, leg, foot)
     strike = _stance(0.0, duty, jog, stride, leg, foot)
     strike_after = _stance(step, duty, jog, stride, leg, foot)
-    for i in range(3):
+    for i in (0, 2):
         start_slope = (leave[i] - leave_before[i] - lift_next[i] + lift[i]) * length / step
-        end_slope = (strike_after[i] - strike[i] - land_next[i] + land[i]) * length / step if i < 2 else 0.0
+        end_slope = (strike_after[i] - strike[i] - land_next[i] + land[i]) * length / step if i == 0 else 0.0
         out[i] = now[i] + _bridge(s, leave[i] - lift[i], start_slope, strike[i] - land[i], end_slope)
     out[3] = out[2] * smooth(3.0 * s)
-    out[4] = now[3] + _bridge(s, -lift[3], (lift[3] - lift_next[3]) * length / step, -land[3], 0.0)
-
-
-@numba.njit(cache=True)
-def _clearance(pitch: float, toe_pitch: float, sole: np.ndarray, toe: np.ndarray) -> float:
-    """Return the lowest point of a sole below its ankle; sole: (N, 4) rest x, z from the ankle, toe share, unused."""
-    c, s = math.cos(pitch), math.sin(pitch)
-    ct, st = math.cos(toe_pitch), math.sin(toe_pitch)
-    joint_z = s * toe[0] + c * toe[1]
-    lowest = 1e9
-    for k in range(len(sole)):
-        x, z, share = sole[k, 0], sole[k, 1], sole[k, 2]
-        with_foot = s * x + c * z
-        with_toes = joint_z + st * (x - toe[0]) + ct * (z - toe[1])
-        lowest = min(lowest, (1.0 - share) * with_foot + share * with_toes)
-    return lowest
+    out[1] = 5.65 * SWING_LIFT * leg * s * (1.0 - s) * (0.35 + 0.65 * s) - _lowest(out[2], out[3], sole, foot)
+    out[4] = now[1] + _bridge(s, -lift[1], (lift[1] - lift_next[1]) * length / step, -land[1], 0.0)
 
 
 @numba.njit(cache=True)
@@ -191,7 +215,7 @@ def pose_gait(
             and walking ankle y.
         sole: (N, 3) points of the left sole: x and z from the ankle, share of the toes.
         trunk_clips: (2, P, 22) rotations (5, 4) and the pelvis' shift left and up, of both clips.
-        foot_clips: (2, P, 5) ankle x, y, z, pitch, stride, of both clips.
+        foot_clips: (2, P, 4) left ankle x and y, foot pitch, stride, of both clips.
         rotations: output (J, 3, 3), body frame.
         positions: output (J, 3), body frame.
     """
@@ -205,7 +229,8 @@ def pose_gait(
         sample(trunk_clips[0], phase + 0.5 * side, walk)
         sample(trunk_clips[1], phase + 0.5 * side, run)
         for i in range(22):
-            rows[side, i] = (1.0 - jog) * walk[i] + jog * run[i]
+            share = min(1.0, ARM_JOG * jog) if 12 <= i < 20 else jog
+            rows[side, i] = (1.0 - share) * walk[i] + share * run[i]
         for k in range(5):
             for i in range(4):
                 value = (1.0 - amplitude) * stand[k, i] + amplitude * rows[side, 4 * k + i]
@@ -247,12 +272,12 @@ def pose_gait(
         first = LEFT if side == 0 else RIGHT
         outward = 1.0 if side == 0 else -1.0
         own = phase + 0.5 * side
-        _foot(own - math.floor(own), jog, stride, leg, foot, foot_clips, state)
+        _foot(own - math.floor(own), jog, stride, leg, foot, sole, foot_clips, state)
         pitch, toe_pitch = amplitude * state[2], amplitude * state[3]
         ankles[side, 0] = (1.0 - amplitude) * foot[4] + amplitude * state[0]
         ankles[side, 1] = outward * ((1.0 - amplitude) * foot[5] + amplitude * (foot[6] + state[4]))
         height = (1.0 - amplitude) * foot[3] + amplitude * state[1]
-        ankles[side, 2] = max(height, -_clearance(pitch, toe_pitch, sole, foot[1:3] - np.array([0.0, foot[3]])))
+        ankles[side, 2] = max(height, -_lowest(pitch, toe_pitch, sole, foot))
         _pitched(pitch, rotations[first + FOOT])
         _pitched(toe_pitch, rotations[first + TOES])
         for i in range(3):

@@ -48,7 +48,11 @@ class Walker:
             self._foot_clips = np.stack(
                 [
                     np.column_stack(
-                        [table[f"{c}_ankle"], table[f"{c}_pitch"], np.full(len(table[f"{c}_pitch"]), table[f"{c}_stride"])]
+                        [
+                            table[f"{c}_ankle"][:, :2],
+                            table[f"{c}_pitch"],
+                            np.full(len(table[f"{c}_pitch"]), table[f"{c}_stride"]),
+                        ]
                     )
                     for c in clips
                 ]
@@ -63,9 +67,7 @@ class Walker:
         self._drops = np.array([self._needed_drop(*blend) for blend in ((0.0, 0.0), (1.0, 0.0), (1.0, JOG_SHARE))])
         self._held = {name: self._hold(posture) for name, posture in postures.POSTURES.items()}
 
-    def place(
-        self, x: float, y: float, heading: float, walked: float, speed: float, posture: str = "walk"
-    ) -> Placed:
+    def place(self, x: float, y: float, heading: float, walked: float, speed: float, posture: str = "walk") -> Placed:
         """Return the person's mesh in the world.
 
         Args:

@@ -36,9 +36,12 @@ def cycle(clip: str) -> dict[str, np.ndarray]:
     """Return the clip's table.
 
     Returns:
-        rotations (32, 5, 4): of `ROTATIONS` in the walking frame (w, x, y, z), arms of the left side, rest = standing
-        with the arms hanging; ankle (32, 3): left, from the mean pelvis, in leg lengths; pitch (32,): of the left foot,
-        rad, toes up; pelvis (32, 2): left and up from its mean, in leg lengths; stride: in leg lengths.
+        rotations (32, 5, 4): of `ROTATIONS` in the walking frame (w, x, y, z), arms of the left side, identity = standing
+            with the arms hanging.
+        ankle (32, 2): the left one, forward and left of the mean pelvis, leg lengths.
+        pitch (32,): of the left foot, rad, toes up.
+        pelvis (32, 2): left and up from its mean, leg lengths.
+        stride: leg lengths.
     """
     path = Path(pybullet_data.getDataPath()) / "data" / "motions" / f"humanoid3d_{clip}.txt"
     frames = np.array(json.loads(path.read_text())["Frames"])
@@ -58,10 +61,9 @@ def cycle(clip: str) -> dict[str, np.ndarray]:
     rotations /= np.sqrt((rotations**2).sum(axis=2, keepdims=True))
     leg = THIGH + SHIN
     pelvis = table[:, 24:26] - (0.0, table[:, 25].mean())
-    ankle = table[:, 20:23] + np.outer(pelvis[:, 1], (0.0, 0.0, 1.0))
     return {
         "rotations": rotations,
-        "ankle": ankle / leg,
+        "ankle": table[:, 20:22] / leg,
         "pitch": table[:, 23],
         "pelvis": pelvis / leg,
         "stride": np.float64((frames[-1, 1] - frames[0, 1]) / leg),
@@ -69,7 +71,7 @@ def cycle(clip: str) -> dict[str, np.ndarray]:
 
 
 def _pose(frame: np.ndarray, travelled: float, columns: tuple[int, ...]) -> np.ndarray:
-    """Return one side's row: five rotations, ankle (3) from the evenly moving pelvis, foot pitch, pelvis left and up."""
+    """Return one side's row: rotations, ankle (3) from the evenly moving pelvis, foot pitch, pelvis left and up."""
     hip, knee, ankle, shoulder, elbow = columns
     side = 1.0 if hip == 30 else -1.0
     pelvis = _turn(frame[4:8])

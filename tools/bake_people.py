@@ -26,11 +26,11 @@ HIGH, LOW = 3300, 1340
 
 MATERIALS = ("skin", "hair", "shirt", "trousers", "shoes", "eyes")
 SKIN, HAIR, SHIRT, TROUSERS, SHOES, EYES = range(6)
-ZONES = ("head", "eye", "hand", "collar", "torso", "upper_sleeve", "sleeve", "trousers", "shoe", "short_hair", "bob")
-HEAD, EYE, HAND, COLLAR, TORSO, UPPER_SLEEVE, SLEEVE, LEG, SHOE, CROP, BOB = range(11)
+HEAD, EYE, HAND, TORSO, UPPER_SLEEVE, SLEEVE, LEG, SHOE, CROP, BOB = range(10)
+"""Parts that a triangle can belong to; a body shows one of the two hair styles."""
 
 HIDDEN = 0.004
-"""Depth under the hair from which the scalp is left out, m."""
+"""Depth under the hair from which the scalp is left out, m (five times that at the nape)."""
 
 MERGED = {
     "LHipJoint": "Hips",
@@ -43,10 +43,11 @@ MERGED = {
     "RightHandFinger1": "RightHand",
 }
 """Bones of the 31-bone rig that never move on their own here, and the bone that carries them."""
-BONES = ("Hips", "LowerBack", "Spine", "Spine1", "Neck", "Neck1", "Head") + tuple(
-    side + name
-    for side in ("Left", "Right")
-    for name in ("Shoulder", "Arm", "ForeArm", "Hand", "UpLeg", "Leg", "Foot", "ToeBase")
+LIMBS = ("Shoulder", "Arm", "ForeArm", "Hand", "UpLeg", "Leg", "Foot", "ToeBase")
+BONES = (
+    *("Hips", "LowerBack", "Spine", "Spine1", "Neck", "Neck1", "Head"),
+    *(f"Left{name}" for name in LIMBS),
+    *(f"Right{name}" for name in LIMBS),
 )
 
 
@@ -105,7 +106,7 @@ def main() -> None:
 
 
 class Base:
-    """The base mesh, its faces by group, its morph targets, and the rig's weights; frame: x forward, y left, z up, m."""
+    """The base mesh, its faces by group, its targets and the rig's weights; frame: x forward, y left, z up, m."""
 
     def __init__(self, folder: Path):
         self.folder = folder
@@ -180,6 +181,7 @@ class Cutter:
         self.zones: list[int] = []
 
     def vertex(self, layer: str, a: int, b: int, share: float) -> int:
+        """Return the number of the point at a share of the way from a to b."""
         a, b = int(self.sealed[a]), int(self.sealed[b])
         if a > b:
             a, b, share = b, a, 1.0 - share
@@ -240,13 +242,15 @@ def dress(base: Base, shapes: dict[str, np.ndarray]) -> Half:
     tights = left["helper-tights"]
     above = [t for t in tights if max(z[t]) > hem]
     sleeve = np.where(is_arm, along - 0.62, -1.0)
-    upper = np.where(is_arm, np.minimum(0.62 - along, along + 9.0), -1.0)
+    upper = np.where(is_arm, 0.62 - along, -1.0)
     arms = [t for t in above if is_arm[t].all()]
     cutter.add("shirt", arms, sleeve, SLEEVE)
     cutter.add("shirt", arms, upper, UPPER_SLEEVE)
     cutter.add("shirt", [t for t in above if not is_arm[t].all()], np.minimum(z - hem, collar - z), TORSO)
     legs = [t for t in tights if not is_arm[t].all() and min(z[t]) < waist]
-    cutter.add("trousers", _clip_low(legs, z, ankle), np.minimum(waist - z, z - (ankle - 0.035)), LEG)
+    cutter.add(
+        "trousers", [t for t in legs if max(z[t]) > ankle - 0.035], np.minimum(waist - z, z - (ankle - 0.035)), LEG
+    )
     cutter.add("shoe", [t for t in tights if min(z[t]) < ankle + 0.03], ankle + 0.03 - z, SHOE)
 
     order = sorted(cutter.keys, key=cutter.keys.__getitem__)
@@ -302,10 +306,6 @@ def _seal(base: Base, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
                         reached[u] = max(reached[u], target[v])
         target = reached
     return target, sockets
-
-
-def _clip_low(triangles: list[list[int]], z: np.ndarray, ankle: float) -> list[list[int]]:
-    return [t for t in triangles if max(z[t]) > ankle - 0.035]
 
 
 def _hair_lines(points: np.ndarray, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -63,6 +63,7 @@ class _Mesh:
                 self._push(v, n)
 
     def collapse_until(self, target: int) -> None:
+        """Remove the cheapest edges until no more than `target` faces are left."""
         while len(self.faces) > target and self.heap:
             _, gone, stays, version_gone, version_stays = heapq.heappop(self.heap)
             if self.version[gone] != version_gone or self.version[stays] != version_stays:
@@ -72,7 +73,6 @@ class _Mesh:
 
     def _quadrics(self, faces: np.ndarray) -> np.ndarray:
         quadrics = np.zeros_like(self.monomials)
-        edges: dict[tuple[int, int], int] = {}
         for a, b, c in faces.tolist():
             corner = self.points[[a, b, c]]
             normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])

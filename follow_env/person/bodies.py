@@ -1,4 +1,6 @@
-"""Bodies that are seen: skinned, clothed people read from `assets/` (origins and licences: LICENCES.md there), and what they wear.
+"""Bodies that are seen: skinned, clothed people, read from `assets/`, and what they wear.
+
+LICENCES.md beside the assets says where they come from.
 
 Rest frame: origin on the floor below the pelvis, x forward, y left, z up, m.
 """

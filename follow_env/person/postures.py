@@ -43,9 +43,9 @@ POSTURES: dict[str, Posture] = {
         left={"upper_arm": (10, 158, 0), "forearm": (4, 172, 0), "thigh": (0, 4, 0), "shin": (0, 4, 0)}
     ),
     "sideways": Posture(
-        trunk={"pelvis": (0, -8, 0), "chest": (4, -32, 0), "head": (2, -38, 0)},
-        left={"upper_arm": (4, 2, 0), "forearm": (16, 0, 0), "thigh": (0, 10, 0), "shin": (0, 10, 0)},
-        right={"upper_arm": (4, -44, 0), "forearm": (14, -40, 0), "thigh": (0, -2, 0), "shin": (0, -2, 0)},
+        trunk={"pelvis": (0, 0, 0), "chest": (4, -34, 0), "head": (2, -40, 0)},
+        left={"upper_arm": (4, 20, 0), "forearm": (16, 22, 0), "thigh": (0, 10, 0), "shin": (0, 10, 0)},
+        right={"upper_arm": (4, -46, 0), "forearm": (14, -42, 0), "thigh": (0, -10, 0), "shin": (0, -10, 0)},
     ),
     "bent": Posture(
         trunk={"pelvis": (38, 0, 0), "chest": (82, 0, 0), "head": (70, 0, 0)},

@@ -49,7 +49,7 @@ class Walker:
                 [
                     np.column_stack(
                         [
-                            table[f"{c}_ankle"][:, :2],
+                            table[f"{c}_ankle"],
                             table[f"{c}_pitch"],
                             np.full(len(table[f"{c}_pitch"]), table[f"{c}_stride"]),
                         ]

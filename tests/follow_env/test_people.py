@@ -2,6 +2,7 @@
 
 import math
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -124,7 +125,7 @@ def test_stance_foot_does_not_slide(walkers, speed: float):
         for side in LEGS.values():
             foot = points[:, soles(walker, side)]
             slid, worst, steps = 0.0, 0.0, 0
-            for before, after in zip(foot, foot[1:], strict=False):
+            for before, after in pairwise(foot):
                 touching = (before[:, 2] < 0.003) & (after[:, 2] < 0.003)
                 steps += slid > 0.0 and not touching.any()
                 moved = np.sqrt(((after - before)[touching, :2] ** 2).sum(axis=1))
@@ -134,7 +135,7 @@ def test_stance_foot_does_not_slide(walkers, speed: float):
             assert steps >= 1, (name, "the foot never left the floor")
 
 
-@pytest.mark.parametrize("speed", (*WALKING, 1.4, 1.6))
+@pytest.mark.parametrize("speed", [*WALKING, 1.4, 1.6])
 def test_feet_are_on_the_floor(walkers, speed: float):
     for walker in walkers.values():
         lowest = cycle(walker, speed, count=48)[:, :, 2].min(axis=1)
@@ -256,7 +257,8 @@ def test_postures_are_distinct_and_where_they_say(walkers):
         head = walker.body.mesh.anchors[:, 2] > 0.9 * height
         assert poses["head_down"][head, 2].max() < 0.3 * height
         for grounded in ("stand", "crouch", "arms_raised", "sideways", "bent"):
-            assert abs(poses[grounded][:, 2].min()) < 0.002
+            for side in LEGS.values():
+                assert abs(poses[grounded][soles(walker, side), 2].min()) < 0.005, grounded
 
 
 def test_outfits_colour_the_materials():

@@ -36,8 +36,8 @@ def cycle(clip: str) -> dict[str, np.ndarray]:
     """Return the clip's table.
 
     Returns:
-        rotations (32, 5, 4): of `ROTATIONS` in the walking frame (w, x, y, z), arms of the left side, identity = standing
-            with the arms hanging.
+        rotations (32, 5, 4): of `ROTATIONS` in the walking frame (w, x, y, z), arms of the left side; the
+            identity stands with the arms hanging.
         ankle (32, 2): the left one, forward and left of the mean pelvis, leg lengths.
         pitch (32,): of the left foot, rad, toes up.
         pelvis (32, 2): left and up from its mean, leg lengths.

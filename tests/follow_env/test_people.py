@@ -187,6 +187,19 @@ def test_pelvis_axis_averages_to_the_stated_place(walkers):
             assert abs(offset[0]) < (0.01 if speed < 1.2 else 0.06)  # a jog leans forward about the axis
 
 
+@pytest.mark.parametrize("speed", [0.25, 0.8, 1.2])
+def test_person_walks_upright_over_the_feet(walkers, speed: float):
+    for walker in walkers.values():
+        points = np.stack([walker.place(0.0, 0.0, 0.0, walker.stride * k / 32, speed).vertices for k in range(32)])
+        assert points[:, :, 2].max(axis=1).min() > 0.95 * walker.body.height
+        for side in LEGS.values():
+            foot = points[:, soles(walker, side)].mean(axis=1)
+            assert abs(foot[:, 0].mean()) < 0.08
+            assert foot[:, 0].max() > 0.25 * walker.stride
+            assert foot[:, 0].min() < -0.2 * walker.stride
+            assert (side * foot[:, 1] > 0.0).all()  # the feet do not cross
+
+
 @pytest.mark.parametrize("speed", [0.1, 0.8, 1.6])
 def test_phase_is_locked_to_the_distance_walked(walkers, speed: float):
     for walker in walkers.values():

@@ -47,12 +47,14 @@ class Placed:
         vertices: (V, 3) float32, world frame, m.
         normals: (V, 3) float32, unit, outward.
         id: 1 = the person to follow, 2.. = others; at most 255.
+        pose: (x, y, heading) of the body on the floor, m and rad: what a renderer of rigid bodies moves.
     """
 
     mesh: Mesh
     vertices: np.ndarray
     normals: np.ndarray
     id: int
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         shape = self.mesh.anchors.shape

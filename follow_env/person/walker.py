@@ -92,15 +92,21 @@ class Walker:
             self._gait(walked / self.stride, 0.0 if posture == "stand" else speed)
             rotations, positions = self._rotations, self._positions
         placement = np.array([x, y, 0.0, math.cos(heading), math.sin(heading)])
-        return self._skinned(rotations, positions, placement)
+        return self._skinned(rotations, positions, placement, (x, y, heading))
 
-    def _skinned(self, rotations: np.ndarray, positions: np.ndarray, placement: np.ndarray) -> Placed:
+    def _skinned(
+        self,
+        rotations: np.ndarray,
+        positions: np.ndarray,
+        placement: np.ndarray,
+        pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ) -> Placed:
         mesh, body = self.body.mesh, self.body
         vertices = np.empty(mesh.anchors.shape, np.float32)
         normals = np.empty(mesh.anchors.shape, np.float32)
         skin(mesh.anchors, body.bones, body.weights, rotations, positions, body.joints, placement, vertices)
         smooth_normals(vertices, mesh.faces, normals)
-        return Placed(mesh, vertices, normals, self.id)
+        return Placed(mesh, vertices, normals, self.id, pose)
 
     def _gait(self, phase: float, speed: float) -> None:
         amplitude = stride.smooth(speed / FULL_WALK)

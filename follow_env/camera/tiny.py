@@ -75,23 +75,18 @@ class TinyRenderer:
 
     def _place(self, people: Sequence[Placed]) -> np.ndarray:
         """Move the people's bodies; return the id to report for each body number plus one."""
-        owner = np.zeros(self._bodies() + 1, np.uint8)
-        placed = dict.fromkeys(body for _, bodies in self._people for body in bodies)
-        for person in people:
-            for body in self._bodies_of(person):
-                x, y, heading = person.pose
-                turn = (0.0, 0.0, math.sin(0.5 * heading), math.cos(0.5 * heading))
+        present = [(person, self._bodies_of(person)) for person in people]
+        for _, bodies in self._people:
+            for body in bodies:
+                pybullet.resetBasePositionAndOrientation(body, AWAY, (0.0, 0.0, 0.0, 1.0), physicsClientId=self._client)
+        owner = np.zeros(pybullet.getNumBodies(physicsClientId=self._client) + 1, np.uint8)
+        for person, bodies in present:
+            x, y, heading = person.pose
+            turn = (0.0, 0.0, math.sin(0.5 * heading), math.cos(0.5 * heading))
+            for body in bodies:
                 pybullet.resetBasePositionAndOrientation(body, (x, y, 0.0), turn, physicsClientId=self._client)
-                placed.pop(body, None)
-                if body + 1 >= len(owner):
-                    owner = np.concatenate((owner, np.zeros(body + 2 - len(owner), np.uint8)))
                 owner[body + 1] = person.id
-        for body in placed:
-            pybullet.resetBasePositionAndOrientation(body, AWAY, (0.0, 0.0, 0.0, 1.0), physicsClientId=self._client)
         return owner
-
-    def _bodies(self) -> int:
-        return int(pybullet.getNumBodies(physicsClientId=self._client))
 
     def _bodies_of(self, person: Placed) -> list[int]:
         """Bodies of a person, one for each colour, made when the person is seen for the first time."""

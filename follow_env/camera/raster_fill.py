@@ -13,12 +13,12 @@ from numba import njit
 
 TILE = 16
 PIXELS = np.uint64(TILE * TILE)
-# Planes of a tile: the pixel's ray, 1/Z, surface point, normal, texture coordinates, pixels per metre, and light.
-X, Y, DEPTH, POINT_X, POINT_Y, POINT_Z, NORMAL_X, NORMAL_Y, S, T, SHARP, SHADE, LIGHT, COLUMN = np.arange(
-    0, 14 * TILE * TILE, TILE * TILE, dtype=np.uint64
+# Planes of a tile: the pixel's ray, 1/Z, surface point, normal, texture coordinates, pixels per metre, light, Z.
+X, Y, DEPTH, POINT_X, POINT_Y, POINT_Z, NORMAL_X, NORMAL_Y, S, T, SHARP, SHADE, LIGHT, DISTANCE, COLUMN = np.arange(
+    0, 15 * TILE * TILE, TILE * TILE, dtype=np.uint64
 )
 LOW, HIGH = COLUMN + np.uint64(TILE), COLUMN + np.uint64(2 * TILE)
-PLANES = 14
+PLANES = 15
 _ZERO = np.float32(0.0)
 _NOWHERE = np.float32(-1.0)
 
@@ -28,14 +28,13 @@ _jit = njit(nogil=True, error_model="numpy")
 @_jit
 def clear(lanes, seen, left, top, step, background):
     """Make the tile empty: the rays of its pixels, 1/Z = `background` and nothing seen."""
-    for i in range(TILE):
-        y = np.float32(top + i * step)
-        for j in range(TILE):
-            pixel = np.uint64(TILE * i + j)
-            lanes[X + pixel] = left + j * step
-            lanes[Y + pixel] = y
+    for k in range(PIXELS):
+        lanes[X + k] = np.float32(left) + np.float32(np.int32(k) & np.int32(15)) * np.float32(step)
+    for k in range(PIXELS):
+        lanes[Y + k] = np.float32(top) + np.float32(np.int32(k) >> np.int32(4)) * np.float32(step)
     for k in range(PIXELS):
         lanes[DEPTH + k] = background
+    for k in range(PIXELS):
         seen[k] = 0
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numba.core import event
 
-from follow_env.camera.raster_fill import DEPTH, TILE, clear, fill_cylinder, fill_facet, fill_triangle
+from follow_env.camera.raster_fill import DEPTH, DISTANCE, PIXELS, TILE, clear, fill_cylinder, fill_facet, fill_triangle
 from follow_env.camera.raster_people import find_triangles
 from follow_env.camera.raster_scene import CYLINDER_PARTS, FACES
 from follow_env.camera.raster_setup import find_cylinders, find_facets
@@ -63,14 +63,20 @@ def _compiled(sources: int) -> Callable[..., int]:
                     work.row[count] = f
                     count += 1
             for column in range(view.columns):
-                _fill_tile(row, column, view, scene, work, count, rounds, starts, entries)
-                _write_tile(row, column, view, scene, people, work, coloured, rgb, depth, ids)
+                n = row * view.columns + column
+                inside = entries[starts[n] : starts[n + 1]]
+                _fill_tile(row, column, view, scene, work, count, rounds, inside)
+                _write_tile(row, column, view, scene, people, work, inside.size, coloured, rgb, depth, ids)
         return 0
 
     return draw
 
 
-@njit(nogil=True, error_model="numpy")
+# Inlined by force: handing over a record of arrays costs more than drawing a tile.
+_inline = njit(nogil=True, error_model="numpy", forceinline=True)
+
+
+@_inline
 def _sort_into_tiles(triangles, view, places):
     """Return (starts, entries): the triangles of tile n are entries[starts[n] : starts[n + 1]]."""
     columns = view.columns
@@ -91,9 +97,9 @@ def _sort_into_tiles(triangles, view, places):
     return starts, entries
 
 
-@njit(nogil=True, error_model="numpy")
-def _fill_tile(row, column, view, scene, work, count, rounds, starts, entries):
-    """Find what the pixels of a tile see among the first `count` facets of `work.row`, cylinders and triangles."""
+@_inline
+def _fill_tile(row, column, view, scene, work, count, rounds, inside):
+    """Find what a tile sees among the first `count` facets of `work.row`, the cylinders and the triangles `inside`."""
     lanes, seen = work.lanes, work.seen
     background, limit = np.float32(1.0 / view.far), np.float32(1.0 / view.near)
     left, top = view.left + column * TILE * view.step, view.top + row * TILE * view.step
@@ -107,33 +113,34 @@ def _fill_tile(row, column, view, scene, work, count, rounds, starts, entries):
     first = 1 + FACES * scene.boxes.shape[0]
     cylinders, places = work.rounds, work.round_places
     for k in range(rounds):
-        inside = places[k, 1] <= column <= places[k, 2] and places[k, 3] <= row <= places[k, 4]
-        if inside and cylinders[k, 5] > floor:
+        met = places[k, 1] <= column <= places[k, 2] and places[k, 3] <= row <= places[k, 4]
+        if met and cylinders[k, 5] > floor:
             fill_cylinder(cylinders, k, np.int32(first + CYLINDER_PARTS * places[k, 0]), lanes, seen, view.near)
     first = scene.surfaces.shape[0]
     triangles, places = work.triangles, work.triangle_places
-    n = row * view.columns + column
-    for k in range(starts[n], starts[n + 1]):
-        t = entries[k]
+    for t in inside:
         upper, lower = max(places[t, 3] - row * TILE, 0), min(places[t, 4] - row * TILE, TILE - 1)
         fill_triangle(triangles, t, upper, lower, np.int32(first + t), lanes, seen, limit)
 
 
-@njit(nogil=True, error_model="numpy")
+@_inline
 def _colour_tile(height, width, view, scene, people, work):
     """Write the colours of the first `height` rows and `width` columns of a tile into `work.colours`.
 
-    The rows are searched for a surface not yet shaded; it is shaded from there to the last row that shows it.
+    A surface of the scene is shaded once, from the first to the last row that shows it.
     """
     lanes, seen, colours, triangles, places = work.lanes, work.seen, work.colours, work.triangles, work.triangle_places
     pattern, albedo = people.pattern, people.colours
     surfaces, textures, lamps, ambient = scene.surfaces, scene.textures, scene.lamps, scene.ambient
     static = surfaces.shape[0]
     done, number_done = work.done, 0
+    previous = np.int32(-1)
     for i in range(height):
         for j in range(width):
             k = np.uint64(i * TILE + j)
             number = seen[k]
+            if number == previous:
+                continue
             if number >= static:
                 t = number - static
                 f = places[t, 0]
@@ -143,6 +150,7 @@ def _colour_tile(height, width, view, scene, people, work):
             if number == 0:
                 colours[k] = BACKGROUND
                 continue
+            previous = number
             known = False
             for n in range(number_done):
                 known |= done[n] == number
@@ -150,34 +158,48 @@ def _colour_tile(height, width, view, scene, people, work):
                 continue
             done[number_done] = number
             number_done += 1
-            last = i
-            for m in range(i * TILE, height * TILE):
-                if seen[np.uint64(m)] == number:
-                    last = m // TILE
-            start, stop = np.uint64(i * TILE), np.uint64((last + 1) * TILE)
+            start, stop = np.uint64(i * TILE), np.uint64(_last_row(seen, number, i, height) * TILE + TILE)
             texture = textures[number]
             shade_surface(number, start, stop, view, surfaces, texture, lamps, ambient, lanes, seen, colours)
 
 
-@njit(nogil=True, error_model="numpy")
-def _write_tile(row, column, view, scene, people, work, coloured, rgb, depth, ids):
-    """Copy a tile to the picture."""
+@_inline
+def _last_row(seen, number, first, height):
+    """Return the last row of the tile, from `first` on, in which `number` is seen."""
+    for i in range(height - 1, first, -1):
+        for j in range(np.uint64(TILE)):
+            if seen[np.uint64(TILE * i) + j] == number:
+                return i
+    return first
+
+
+@_inline
+def _write_tile(row, column, view, scene, people, work, triangles, coloured, rgb, depth, ids):
+    """Copy a tile, in which `triangles` may be seen, to the picture."""
     lanes, seen, colours, places, names = work.lanes, work.seen, work.colours, work.triangle_places, people.ids
-    x0, y0 = column * TILE, row * TILE
-    width, height = min(TILE, view.width - x0), min(TILE, view.height - y0)
+    x0, y0 = np.uint64(column * TILE), np.uint64(row * TILE)
+    width, height = min(TILE, view.width - column * TILE), min(TILE, view.height - row * TILE)
+    columns, rows = np.uint64(width), np.uint64(height)
     static = scene.surfaces.shape[0]
     far = np.float32(view.far)
-    for i in range(height):
-        for j in range(width):
-            k = np.uint64(TILE * i + j)
-            number = seen[k]
-            depth[y0 + i, x0 + j] = np.float32(1.0) / lanes[DEPTH + k] if number else far
-            ids[y0 + i, x0 + j] = names[places[number - static, 0]] if number >= static else 0
+    for k in range(PIXELS):
+        lanes[DISTANCE + k] = np.float32(1.0) / lanes[DEPTH + k] if seen[k] else far
+    for i in range(rows):
+        for j in range(columns):
+            depth[y0 + i, x0 + j] = lanes[DISTANCE + np.uint64(TILE) * i + j]
+        for j in range(columns):
+            ids[y0 + i, x0 + j] = 0
+    if triangles:
+        for i in range(rows):
+            for j in range(columns):
+                number = seen[np.uint64(TILE) * i + j]
+                if number >= static:
+                    ids[y0 + i, x0 + j] = names[places[number - static, 0]]
     if coloured:
         _colour_tile(height, width, view, scene, people, work)
-        for i in range(height):
-            for j in range(width):
-                colour = colours[np.uint64(TILE * i + j)]
+        for i in range(rows):
+            for j in range(columns):
+                colour = colours[np.uint64(TILE) * i + j]
                 rgb[y0 + i, x0 + j, 0] = np.uint8(colour)
                 rgb[y0 + i, x0 + j, 1] = np.uint8(colour >> np.uint32(8))
                 rgb[y0 + i, x0 + j, 2] = np.uint8(colour >> np.uint32(16))

@@ -8,6 +8,7 @@ from numba import njit
 
 from follow_env.camera.raster_fill import (
     DEPTH,
+    DISTANCE,
     LIGHT,
     NORMAL_X,
     NORMAL_Y,
@@ -57,7 +58,7 @@ def shade_surface(number, first, last, view, surfaces, texture, lamps, ambient, 
     if height < _ZERO:
         n0, n1, n2, height = -n0, -n1, -n2, -height
     for k in range(first, last):
-        distance = _ONE / lanes[DEPTH + k]
+        distance = lanes[DISTANCE + k]
         px = ex + distance * (c + s * lanes[X + k])
         py = ey + distance * (s - c * lanes[X + k])
         lanes[POINT_X + k], lanes[POINT_Y + k] = px, py
@@ -91,7 +92,7 @@ def shade_surface(number, first, last, view, surfaces, texture, lamps, ambient, 
 @_jit
 def shade_triangle(k, t, kind, red, green, blue, triangles, lanes):
     """Return the colour of pixel k (uint64), which sees triangle t of this pattern and albedo."""
-    x, y, distance = lanes[X + k], lanes[Y + k], _ONE / lanes[DEPTH + k]
+    x, y, distance = lanes[X + k], lanes[Y + k], lanes[DISTANCE + k]
     light = max((triangles[t, 12] * x + triangles[t, 13] * y + triangles[t, 14]) * distance, _ZERO) * _FULL
     if kind:
         az = (triangles[t, 21] * x + triangles[t, 22] * y + triangles[t, 23]) * distance

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from follow_env.person.bodies import ASSETS, BODIES, DETAILS, MATERIALS, OUTFITS, Outfit, load_body
+from follow_env.person.stride import FOOT, HAND, HEAD, LEFT, RIGHT, SHIN, THIGH
 from follow_env.person.walker import POSTURES, Walker
+from follow_env.physics import PERSON_HEIGHT, PERSON_RADIUS
 
 SPEEDS = (0.25, 0.8, 1.2, 1.4, 1.6)
 WALKING = (0.0, 0.1, 0.25, 0.8, 1.15)
@@ -30,6 +32,22 @@ def cycle(walker: Walker, speed: float, count: int = 128, cycles: float = 1.0) -
 def soles(walker: Walker, side: float) -> np.ndarray:
     rest = walker.body.mesh.anchors
     return np.flatnonzero((rest[:, 2] < 0.005) & (side * rest[:, 1] > 0))
+
+
+def moved_by(walker: Walker, *bones: int) -> np.ndarray:
+    """Vertices that follow these bones more than any others."""
+    body = walker.body
+    return np.flatnonzero(np.isin(body.bones[np.arange(len(body.bones)), body.weights.argmax(axis=1)], bones))
+
+
+def carried(walker: Walker, vertices: np.ndarray, bone: int, joint: int) -> np.ndarray:
+    """Where a bone carries a joint: the affine motion of the vertices that follow it alone, applied to the joint."""
+    body = walker.body
+    own = (np.where(body.bones == bone, body.weights, 0.0).sum(axis=1)) > 0.999
+    rest = np.column_stack([body.mesh.anchors[own].astype(float), np.ones(own.sum())])
+    motion, _, rank, _ = np.linalg.lstsq(rest, vertices[own].astype(float), rcond=None)
+    assert rank == 4
+    return np.array([*body.joints[joint], 1.0]) @ motion
 
 
 def edges(faces: np.ndarray) -> np.ndarray:
@@ -81,6 +99,10 @@ def test_surfaces_face_outward(walkers):
         volume = float((a * np.cross(b, c)).sum()) / 6.0
         assert 0.015 < volume < 0.15  # litres of a person and not minus that; open hems leave a little out
         assert np.abs((placed.normals.astype(float) ** 2).sum(axis=1) - 1.0).max() < 1e-4
+        across = np.cross(b - a, c - a)
+        outward = (placed.normals[placed.mesh.faces].mean(axis=1) * across).sum(axis=1) > 0.0
+        area = np.sqrt((across**2).sum(axis=1))
+        assert area[outward].sum() > 0.99 * area.sum()  # the thin edge of a hand may turn
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -89,6 +111,23 @@ def test_standing_height_is_the_stated_one(name: str):
     vertices = walker.place(0.0, 0.0, 0.0, 0.0, 0.0, "stand").vertices
     assert abs(np.ptp(vertices[:, 2]) - walker.body.height) < 0.02
     assert abs(vertices[:, 2].min()) < 0.001
+
+
+def test_the_default_person_is_as_tall_as_the_collision_body():
+    assert load_body().height == pytest.approx(PERSON_HEIGHT, abs=0.03)
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.25, 0.92, 1.15])
+def test_the_visible_body_is_where_the_collision_body_is(walkers, speed: float):
+    """The trunk and the head stay inside the capsule (25 cm around the axis), the limbs within a step of it."""
+    for name, walker in walkers.items():
+        trunk, middle = moved_by(walker, *range(HEAD + 1)), moved_by(walker, *range(4))
+        for k in range(48):
+            vertices = walker.place(2.0, -1.0, 0.8, walker.stride * k / 48, speed).vertices
+            away = np.hypot(vertices[:, 0] - 2.0, vertices[:, 1] + 1.0)
+            assert away[trunk].max() < PERSON_RADIUS, (name, k)
+            assert away.max() < 0.65, (name, k)
+            assert vertices[middle, :2].mean(axis=0) == pytest.approx((2.0, -1.0), abs=0.05), (name, k)
 
 
 def test_bodies_differ_and_cover_the_stated_range(walkers):
@@ -164,6 +203,58 @@ def test_person_faces_the_heading(walkers, heading: float):
         for shoe in shoes:
             along = (shoe[:, :2] - (3.0, -2.0)) @ forward
             assert np.ptp(along) > 0.1
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0, math.pi / 2, -2.5])
+def test_toes_and_knees_point_where_the_heading_does(walkers, heading: float):
+    """Toes before heels, knees bending forward, the left foot on the left."""
+    forward = np.array([math.cos(heading), math.sin(heading)])
+    leftward = np.array([-math.sin(heading), math.cos(heading)])
+    for name, walker in walkers.items():
+        rest, shoes = walker.body.mesh.anchors, {side: soles(walker, side) for side in LEGS.values()}
+        widths = []
+        for k in range(12):
+            vertices = walker.place(1.0, 2.0, heading, walker.stride * k / 12, 0.92).vertices
+            along = (vertices[:, :2] - (1.0, 2.0)) @ forward
+            for shoe in shoes.values():
+                toe, heel = shoe[rest[shoe, 0].argmax()], shoe[rest[shoe, 0].argmin()]
+                assert along[toe] - along[heel] > 0.085 * walker.body.height, (name, k)
+            for first in (LEFT, RIGHT):
+                bones = ((THIGH, THIGH), (THIGH, SHIN), (SHIN, FOOT))
+                joints = [carried(walker, vertices, first + bone, first + joint)[:2] for bone, joint in bones]
+                hip, knee, ankle = ((joint - (1.0, 2.0)) @ forward for joint in joints)
+                assert knee > 0.5 * (hip + ankle) - 0.01, (name, k)
+            left, right = (vertices[shoes[side], :2].mean(axis=0) @ leftward for side in (1.0, -1.0))
+            widths.append(left - right)
+        assert min(widths) > 0.05, name
+        assert np.ptp(widths) < 0.015, name
+
+
+def test_legs_alternate_and_arms_swing_against_them(walkers):
+    for walker in walkers.values():
+        points = np.stack([walker.place(0.0, 0.0, 0.0, walker.stride * k / 48, 0.92).vertices for k in range(48)])
+        feet, hands = (
+            [points[:, moved_by(walker, first + bone), 0].mean(axis=1) for first in (LEFT, RIGHT)]
+            for bone in (FOOT, HAND)
+        )
+        assert np.roll(feet[0], 24) == pytest.approx(feet[1], abs=5e-4)
+        difference = feet[0] - feet[1]
+        assert np.count_nonzero(np.diff(np.sign(difference))) in (1, 2)
+        assert np.ptp(difference) > 0.75 * walker.stride
+        for foot, hand in zip(feet, hands, strict=True):
+            assert np.corrcoef(foot, hand)[0, 1] < -0.7
+
+
+def test_the_raised_foot_moves_forward_past_the_standing_one(walkers):
+    """The other way round would be walking backwards."""
+    for walker in walkers.values():
+        feet = [cycle(walker, 0.92, count=48)[:, soles(walker, side)] for side in LEGS.values()]
+        ahead = feet[0][:, :, 0].mean(axis=1) - feet[1][:, :, 0].mean(axis=1)
+        above = feet[0][:, :, 2].min(axis=1) - feet[1][:, :, 2].min(axis=1)
+        faster, higher = np.diff(ahead), 0.5 * (above[1:] + above[:-1])
+        clearly = np.abs(higher) > 0.02
+        assert clearly.sum() > 10
+        assert np.corrcoef(faster[clearly], higher[clearly])[0, 1] > 0.7
 
 
 def test_heading_and_place_are_a_rigid_motion(walkers):

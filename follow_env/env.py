@@ -77,7 +77,8 @@ class FollowEnv(gymnasium.Env):
             `{"measurement": {"miss_share": 0.1}}`.
         camera: mapping of `CameraConfig` settings, e.g. `{"width": 320, "height": 240}`.
         robot: mapping of `RobotConfig` settings.
-        renderer: `"raster"` (ours) or `"tiny"` (PyBullet's, slow, with a rigid person: a cross-check).
+        renderer: `"raster"` (ours) or `"tiny"` (PyBullet's, slow, a cross-check: the person keeps the posture of
+            the episode's first picture).
         control_hz: control and camera rate; divides 240.
         latency_s: age of what is observed, s; a multiple of the control period.
         person: body of the person, one of `follow_env.person.bodies.BODIES`.
@@ -166,6 +167,9 @@ class FollowEnv(gymnasium.Env):
         outfit = choose("outfit", options.get("outfit", self._outfit), OUTFITS)
         if self._dressed != (body, outfit):
             self._dressed, self._walker = (body, outfit), None
+        if self._renderer_name == "tiny" and self._renderer is not None:
+            self._renderer.close()  # its rigid people keep the posture of the last episode
+            self._renderer = None
 
         x, y, yaw = self.scene.start
         y += float(self.np_random.uniform(-1.0, 1.0)) * self.scene.start_width

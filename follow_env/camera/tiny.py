@@ -94,10 +94,12 @@ class TinyRenderer:
             if mesh is person.mesh:
                 return bodies
         x, y, heading = person.pose
-        turn = np.array(((math.cos(heading), -math.sin(heading)), (math.sin(heading), math.cos(heading))))
+        cosine, sine = math.cos(heading), math.sin(heading)
         vertices, normals = person.vertices.astype(np.float64), person.normals.astype(np.float64)
-        vertices[:, :2] = (vertices[:, :2] - (x, y)) @ turn
-        normals[:, :2] = normals[:, :2] @ turn
+        vertices[:, :2] -= (x, y)
+        for part in (vertices, normals):
+            ahead, left = part[:, 0].copy(), part[:, 1].copy()
+            part[:, 0], part[:, 1] = cosine * ahead + sine * left, cosine * left - sine * ahead
         colours, kind = np.unique(person.mesh.colours, axis=0, return_inverse=True)
         bodies = [
             self._add_mesh(vertices, normals, person.mesh.faces[kind.reshape(-1) == k], colour)

@@ -15,10 +15,11 @@ from baselines.benchmark.configuration import machine, packages
 from baselines.benchmark.report import markdown_table
 from baselines.policy import make_follower
 from follow_env import IDS
-from follow_env.camera import CameraPose, PinholeCamera, make_renderer
+from follow_env.camera import CameraPose, PinholeCamera, Renderer, make_renderer
 from follow_env.config import CameraConfig
 from follow_env.env import FollowEnv
-from follow_env.person.gait import pose
+from follow_env.person.bodies import load_body
+from follow_env.person.walker import Walker
 from follow_env.physics import World
 from follow_env.scenes import make_scene
 
@@ -43,8 +44,8 @@ def speed(quick: bool = False) -> list[Cost]:
     for scene in IDS:
         costs += _stepping(scene, count)
     for width, height in FRAME_SIZES:
-        costs.append(_frame(width, height, max(count // 15, 2)))
-    costs.append(_pixel_step(max(count // 15, 2)))
+        costs += _frames(width, height, count)
+    costs.append(_pixel_step(count))
     return costs
 
 
@@ -117,22 +118,35 @@ def _stepping(scene: str, count: int) -> list[Cost]:
     return costs
 
 
-def _frame(width: int, height: int, count: int) -> Cost:
+def _frames(width: int, height: int, count: int) -> list[Cost]:
+    """Frames of the same room and the same person by each renderer, the person's mesh included."""
     scene, camera = make_scene("indoor"), PinholeCamera(CameraConfig(width=width, height=height))
-    renderer = make_renderer("tiny", scene, camera, "blue")
-    walker = pose(1.5, 0.0, 0.0, 0.7, 0.9)
-    cost = _time(
-        f"indoor: frame {width}x{height}, tiny", lambda: renderer.render(CameraPose(0.1, 0.0, 1.0, 0.0), walker), count
-    )
-    renderer.close()
-    return cost
+    walker, eye, costs = Walker(load_body()), CameraPose(0.1, 0.0, 1.0, 0.0), []
+    peer = f"indoor: frame {width}x{height}, tiny"
+    for name in ("tiny", "raster"):
+        renderer = make_renderer(name, scene, camera)
+
+        def render(renderer: Renderer = renderer) -> None:
+            renderer.render(eye, (walker.place(1.6, 0.0, 0.0, 0.7, 0.9),))
+
+        few = max(count // 15, 2) if name == "tiny" else count
+        costs.append(_time(f"indoor: frame {width}x{height}, {name}", render, few, None if name == "tiny" else peer))
+        renderer.close()
+    return costs
 
 
 def _pixel_step(count: int) -> Cost:
-    env = FollowEnv("indoor", obs="rgbd_box")
+    env = FollowEnv("indoor", obs="rgbd")
     env.reset(seed=0)
     action = np.array((0.4, 0.0), np.float32)
-    cost = _time("indoor: environment step, obs=rgbd_box 160x120", lambda: env.step(action), count)
+
+    def step() -> None:
+        _, _, terminated, truncated, _ = env.step(action)
+        if terminated or truncated:
+            env.reset()
+
+    size = f"{env.camera.width}x{env.camera.height}"
+    cost = _time(f"indoor: environment step, obs=rgbd {size}", step, count)
     env.close()
     return cost
 

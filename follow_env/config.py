@@ -68,8 +68,8 @@ class CameraConfig:
         near, far: clipping distances of the renderer, m.
     """
 
-    width: int = 160
-    height: int = 120
+    width: int = 320
+    height: int = 240
     hfov_deg: float = 57.5
     near: float = 0.1
     far: float = 30.0

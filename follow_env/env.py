@@ -13,8 +13,8 @@ from follow_env.camera import RENDERERS, CameraPose, PinholeCamera, Renderer, RG
 from follow_env.camera.depth import DepthSensor
 from follow_env.config import CameraConfig, RobotConfig, SensorConfig, build, choose, sensor_config
 from follow_env.measurement import GaussMarkov, MeasurementModel
-from follow_env.person import gait
-from follow_env.person.body import CLOTHES
+from follow_env.person.bodies import BODIES, OUTFITS, load_body
+from follow_env.person.walker import Walker
 from follow_env.physics import PERSON_RADIUS, PHYSICS_HZ, World
 from follow_env.reward import (
     BAND_BEARING,
@@ -32,7 +32,7 @@ OBSERVATIONS = ("measurement", "state", "rgbd", "rgbd_box", "rgbd_uint8")
 ACTIONS = ("twist", "wheels")
 SETTINGS = (
     *("scene", "obs", "action", "route", "sensor", "camera", "robot", "renderer", "control_hz", "latency_s"),
-    *("person", "render_mode"),
+    *("person", "outfit", "render_mode"),
 )
 MAX_DISTANCE = 20.0
 LOST_AFTER = 5.0
@@ -77,10 +77,12 @@ class FollowEnv(gymnasium.Env):
             `{"measurement": {"miss_share": 0.1}}`.
         camera: mapping of `CameraConfig` settings, e.g. `{"width": 320, "height": 240}`.
         robot: mapping of `RobotConfig` settings.
-        renderer: `"tiny"` (PyBullet's software renderer).
+        renderer: `"raster"` (ours) or `"tiny"` (PyBullet's, slow, a cross-check: the person keeps the posture of
+            the episode's first picture).
         control_hz: control and camera rate; divides 240.
         latency_s: age of what is observed, s; a multiple of the control period.
-        person: clothes of the person, a key of `follow_env.person.body.CLOTHES`.
+        person: body of the person, one of `follow_env.person.bodies.BODIES`.
+        outfit: what the person wears, a key of `follow_env.person.bodies.OUTFITS`.
         render_mode: None, `"rgb_array"` (dashboard), `"rgbd_tuple"` ((rgb, depth) of the robot) or `"human"`.
 
     Raises:
@@ -98,10 +100,11 @@ class FollowEnv(gymnasium.Env):
         sensor: str | Mapping[str, Any] | SensorConfig = "xtion",
         camera: Mapping[str, Any] | None = None,
         robot: Mapping[str, Any] | None = None,
-        renderer: str = "tiny",
+        renderer: str = "raster",
         control_hz: int = 30,
         latency_s: float = 0.0,
-        person: str = "blue",
+        person: str = "man",
+        outfit: str = "blue",
         render_mode: str | None = None,
         **unknown: Any,
     ) -> None:
@@ -116,7 +119,7 @@ class FollowEnv(gymnasium.Env):
         self._action = choose("action", action, ACTIONS)
         self._route_name = choose("route", route, ROUTES)
         self._renderer_name = choose("renderer", renderer, RENDERERS)
-        self._person = choose("person", person, CLOTHES)
+        self._person, self._outfit = choose("person", person, BODIES), choose("outfit", outfit, OUTFITS)
         self.render_mode = (
             None if render_mode is None else choose("render_mode", render_mode, self.metadata["render_modes"])
         )
@@ -142,24 +145,31 @@ class FollowEnv(gymnasium.Env):
         self.observation_space = self._make_observation_space()
         self._route: Route | None = None
         self.observed: RGBDFrame | None = None
-        self._dressed = self._person
+        self._dressed = (self._person, self._outfit)
+        self._walker: Walker | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Start an episode.
 
         Args:
             seed: seeds the environment's generator; one seed gives one episode, bit for bit.
-            options: `route` (name), `robot_pose` ((x, y, yaw), m and rad), `person` (clothes), `sensor`: for this
-                episode only.
+            options: `route` (name), `robot_pose` ((x, y, yaw), m and rad), `person` (body), `outfit`, `sensor`: for
+                this episode only.
         """
         super().reset(seed=seed)
         options = options or {}
         for key in options:
-            choose("reset option", key, ("route", "robot_pose", "person", "sensor"))
+            choose("reset option", key, ("route", "robot_pose", "person", "outfit", "sensor"))
         if self._world is None:
             self._world = World(self.scene, self.robot_config)
         self._set_up_sensors(sensor_config(options["sensor"]) if "sensor" in options else self._sensor)
-        self._dress(choose("person", options.get("person", self._person), CLOTHES))
+        body = choose("person", options.get("person", self._person), BODIES)
+        outfit = choose("outfit", options.get("outfit", self._outfit), OUTFITS)
+        if self._dressed != (body, outfit):
+            self._dressed, self._walker = (body, outfit), None
+        if self._renderer_name == "tiny" and self._renderer is not None:
+            self._renderer.close()  # its rigid people keep the posture of the last episode
+            self._renderer = None
 
         x, y, yaw = self.scene.start
         y += float(self.np_random.uniform(-1.0, 1.0)) * self.scene.start_width
@@ -239,10 +249,12 @@ class FollowEnv(gymnasium.Env):
             raise gymnasium.error.ResetNeeded("frame() was called before reset(); call reset() first")
         assert self._world is not None
         if self._renderer is None:
-            self._renderer = make_renderer(self._renderer_name, self.scene, self.camera, self._dressed)
-        x, y, heading = self._route.pose(self.time)
-        person = gait.pose(x, y, heading, self._route.walked(self.time), self._route.speed(self.time))
-        return self._renderer.render(self.camera_pose(), person)
+            self._renderer = make_renderer(self._renderer_name, self.scene, self.camera)
+        if self._walker is None:
+            self._walker = Walker(load_body(*self._dressed))
+        t = self.time
+        person = self._walker.place(*self._route.pose(t), self._route.walked(t), self._route.speed(t))
+        return self._renderer.render(self.camera_pose(), (person,))
 
     def camera_pose(self) -> CameraPose:
         """Pose of the camera in the world frame."""
@@ -294,11 +306,6 @@ class FollowEnv(gymnasium.Env):
         self._box_config = sensor.box
         self._box_error = GaussMarkov(4, sensor.box.correlation_s, self.dt)
         self._queue: deque[Any] = deque()
-
-    def _dress(self, clothes: str) -> None:
-        self._dressed = clothes
-        if self._renderer is not None:
-            self._renderer.dress(clothes)
 
     def _look(self) -> None:
         """Update the truth: poses, bearing, distance, visibility and what is counted from them."""

@@ -12,10 +12,14 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Material:
-    """A surface: colour as sRGB in [0, 1] and a specular share in [0, 1]."""
+    """A surface: colour as sRGB in [0, 1], a specular share in [0, 1] and a texture.
+
+    The textures are named in `follow_env.camera.textures.TEXTURES`; a renderer without them draws the plain colour.
+    """
 
     colour: tuple[float, float, float]
     specular: float = 0.1
+    texture: str = "plain"
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from follow_env.config import CameraConfig
 if TYPE_CHECKING:
     import gymnasium
 
-CAMERA = {"width": 160, "height": 120}
+CAMERA = {"width": 320, "height": 240}
 """Picture of the `mask` rung, px."""
 
 

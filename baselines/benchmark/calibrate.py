@@ -1,7 +1,7 @@
 """`follow calibrate`: measures and fits everything that Table 1 needs fixed before any filter is compared.
 
 1. Rendered frames of each scene (truth-driven robot, seeds of their own) give the errors of each depth rule: bias,
-   spread, correlation, outliers (farther than `OUTLIER` from the median), misses.
+   spread, correlation, outliers (`OUTLIER` away from the median), misses.
 2. The emulated sensor keeps the shape that the rule `SHAPE_RULE` has; one scale per scene and quantity makes its RMSE
    the paper's No filter row. The family has other shapes, scaled in the same way.
 3. R is the covariance without outliers. Q is the smallest whole multiple of (r dt)^2 at which clean measurements are
@@ -39,7 +39,7 @@ ALPHA = 0.05
 FIRST_SEED = 10_000
 FRAME_EPISODES, RULE_EPISODES = 20, 8
 OUTLIER = (0.1, 0.3)
-"""Errors farther than this from the median are outliers, rad and m."""
+"""Errors farther than this from the median (of the distance: beyond it) are outliers, rad and m."""
 WALKING_SPEED = 12.0 / 14.0
 SHAPE_RULE = "grid_mean"
 """Mean over the box: the reading of "z_c is measured by the camera" that lets the background in (paper B, (25))."""
@@ -135,14 +135,14 @@ def _summarise(episodes: Sequence[dict[str, Samples]]) -> dict[str, dict[str, An
             series = [[error[axis] for error in episode] for episode in found]
             values = [value for episode in series for value in episode]
             middle = statistics.median(values)
-            far = [[abs(value - middle) > OUTLIER[axis] for value in episode] for episode in series]
+            far = [[_is_outlier(value - middle, axis) for value in episode] for episode in series]
             core = [
                 v
                 for episode, flags in zip(series, far, strict=True)
                 for v, f in zip(episode, flags, strict=True)
                 if not f
             ]
-            beyond = sorted(v - middle for v in values if abs(v - middle) > OUTLIER[axis])
+            beyond = sorted(v - middle for v in values if _is_outlier(v - middle, axis))
             runs = sum(flags[i] and not (i and flags[i - 1]) for flags in far for i in range(len(flags)))
             entry[name] = {
                 "rmse": math.sqrt(math.fsum(v * v for v in values) / len(values)),
@@ -156,7 +156,7 @@ def _summarise(episodes: Sequence[dict[str, Samples]]) -> dict[str, dict[str, An
             }
             for side, farther in (("nearer", False), ("farther", True)):
                 flags = [
-                    abs(error[axis] - middle) > OUTLIER[axis]
+                    _is_outlier(error[axis] - middle, axis)
                     for episode in found
                     for error in episode
                     if (error[2] > FAR_FROM) == farther
@@ -164,6 +164,11 @@ def _summarise(episodes: Sequence[dict[str, Samples]]) -> dict[str, dict[str, An
                 entry[name][f"{side}_outlier_share"] = sum(flags) / len(flags)
         summary[rule] = entry
     return summary
+
+
+def _is_outlier(offset: float, axis: int) -> bool:
+    """Whether an error so far from the median is an outlier: of the distance, only background counts."""
+    return (offset if axis else abs(offset)) > OUTLIER[axis]
 
 
 def _correlation_time(series: list[list[float]], far: list[list[bool]], mean: float) -> float:

@@ -1,46 +1,48 @@
-"""`TinyRenderer`: PyBullet's software rasteriser behind the `Renderer` interface.
+"""`TinyRenderer`: PyBullet's software rasteriser behind the `Renderer` interface, a cross-check for the default camera.
 
 It draws in a client of its own, so that the physics client steps without visual bodies. One directional light stands
-for the scene's lamps; its strength follows the lamps' falloff at the place the camera looks at.
+for the scene's lamps; its strength follows the lamps' falloff at the place the camera looks at. People are rigid: each
+keeps the posture in which it was seen first and is moved by its pose, since PyBullet cannot change a mesh.
 """
 
 import math
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pybullet
 
 from follow_env.camera.frame import RGBDFrame
+from follow_env.camera.mesh import Mesh, Placed
 from follow_env.camera.pinhole import CameraPose, PinholeCamera
-from follow_env.person.body import segments
-from follow_env.person.gait import SegmentPose
-from follow_env.scene import Box, Cylinder, Material, Scene
+from follow_env.scene import Box, Cylinder, Scene
 
 LIGHT_DIRECTION = (0.25, 0.45, 1.0)
+AWAY = (0.0, 0.0, -1000.0)
+"""Where people are put who are not in the picture, m."""
 
 
 class TinyRenderer:
-    """Draws `scene` and a person in `clothes` with PyBullet's TinyRenderer, without shadows."""
+    """Draws `scene` and people with PyBullet's TinyRenderer, without shadows."""
 
-    def __init__(self, scene: Scene, camera: PinholeCamera, clothes: str) -> None:
+    def __init__(self, scene: Scene, camera: PinholeCamera) -> None:
         self._scene, self._camera = scene, camera
         self._client = pybullet.connect(pybullet.DIRECT)
         x0, x1, y0, y1 = scene.bounds
         floor = Box((0.5 * (x0 + x1), 0.5 * (y0 + y1), -0.05), (x1 - x0, y1 - y0, 0.1), scene.floor)
         for primitive in (floor, *scene.primitives):
             self._add_primitive(primitive)
-        self._person = [self._add_mesh(*s.mesh(), Material(s.colour, 0.0)) for s in segments(clothes)]
+        self._people: list[tuple[Mesh, list[int]]] = []
         self._projection = camera.projection_matrix()
         # TinyRenderer samples a pixel at its lower left corner, not its centre: shift the picture by half a pixel.
         self._projection[8] += 1.0 / camera.width
         self._projection[9] += 1.0 / camera.height
 
-    def render(self, camera: CameraPose, person: list[SegmentPose]) -> RGBDFrame:
-        """Return the frame seen from `camera` with the person's segments at `person`."""
+    def render(self, camera: CameraPose, people: Sequence[Placed] = ()) -> RGBDFrame:
+        """Return the frame seen from `camera` with the people at their poses."""
         client, config = self._client, self._camera.config
-        for body, (position, orientation) in zip(self._person, person, strict=True):
-            pybullet.resetBasePositionAndOrientation(body, position, orientation, physicsClientId=client)
+        owner = self._place(people)
         ahead = (camera.x + 2.0 * math.cos(camera.yaw), camera.y + 2.0 * math.sin(camera.yaw))
         lamps = self._scene.illumination(*ahead)
         _, _, rgba, buffer, segmentation = pybullet.getCameraImage(
@@ -62,19 +64,49 @@ class TinyRenderer:
         rgb = np.ascontiguousarray(np.asarray(rgba, np.uint8).reshape(*shape, 4)[:, :, :3])
         z_buffer = np.asarray(buffer, np.float64).reshape(shape)
         depth = config.far * config.near / (config.far - (config.far - config.near) * z_buffer)
-        ids = (np.asarray(segmentation).reshape(shape) >= self._person[0]).astype(np.uint8)
+        ids = owner[np.asarray(segmentation).reshape(shape) + 1]
         return RGBDFrame(rgb, depth.astype(np.float32), ids)
-
-    def dress(self, clothes: str) -> None:
-        """Give the person these clothes."""
-        for body, segment in zip(self._person, segments(clothes), strict=True):
-            pybullet.changeVisualShape(body, -1, rgbaColor=(*segment.colour, 1.0), physicsClientId=self._client)
 
     def close(self) -> None:
         """Disconnect from PyBullet; a second call does nothing."""
         if self._client >= 0:
             pybullet.disconnect(self._client)
             self._client = -1
+
+    def _place(self, people: Sequence[Placed]) -> np.ndarray:
+        """Move the people's bodies; return the id to report for each body number plus one."""
+        present = [(person, self._bodies_of(person)) for person in people]
+        for _, bodies in self._people:
+            for body in bodies:
+                pybullet.resetBasePositionAndOrientation(body, AWAY, (0.0, 0.0, 0.0, 1.0), physicsClientId=self._client)
+        owner = np.zeros(pybullet.getNumBodies(physicsClientId=self._client) + 1, np.uint8)
+        for person, bodies in present:
+            x, y, heading = person.pose
+            turn = (0.0, 0.0, math.sin(0.5 * heading), math.cos(0.5 * heading))
+            for body in bodies:
+                pybullet.resetBasePositionAndOrientation(body, (x, y, 0.0), turn, physicsClientId=self._client)
+                owner[body + 1] = person.id
+        return owner
+
+    def _bodies_of(self, person: Placed) -> list[int]:
+        """Bodies of a person, one for each colour, made when the person is seen for the first time."""
+        for mesh, bodies in self._people:
+            if mesh is person.mesh:
+                return bodies
+        x, y, heading = person.pose
+        cosine, sine = math.cos(heading), math.sin(heading)
+        vertices, normals = person.vertices.astype(np.float64), person.normals.astype(np.float64)
+        vertices[:, :2] -= (x, y)
+        for part in (vertices, normals):
+            ahead, left = part[:, 0].copy(), part[:, 1].copy()
+            part[:, 0], part[:, 1] = cosine * ahead + sine * left, cosine * left - sine * ahead
+        colours, kind = np.unique(person.mesh.colours, axis=0, return_inverse=True)
+        bodies = [
+            self._add_mesh(vertices, normals, person.mesh.faces[kind.reshape(-1) == k], colour)
+            for k, colour in enumerate(colours)
+        ]
+        self._people.append((person.mesh, bodies))
+        return bodies
 
     def _add_primitive(self, primitive: Box | Cylinder) -> None:
         client, colour = self._client, (*primitive.material.colour, 1.0)
@@ -106,18 +138,18 @@ class TinyRenderer:
             physicsClientId=client,
         )
 
-    def _add_mesh(self, vertices: np.ndarray, normals: np.ndarray, indices: np.ndarray, material: Material) -> int:
+    def _add_mesh(self, vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray, colour: np.ndarray) -> int:
         """Add a mesh by way of an OBJ file: PyBullet loses the memory of meshes that are handed over as lists."""
         lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
         lines += [f"vn {x!r} {y!r} {z!r}" for x, y, z in normals.tolist()]
-        lines += ["vt 0 0", *(f"f {a}/1/{a} {b}/1/{b} {c}/1/{c}" for a, b, c in (indices.reshape(-1, 3) + 1).tolist())]
+        lines += ["vt 0 0", *(f"f {a}/1/{a} {b}/1/{b} {c}/1/{c}" for a, b, c in (faces + 1).tolist())]
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder, "segment.obj")
             path.write_text("\n".join(lines) + "\n", encoding="ascii")
             shape = pybullet.createVisualShape(
                 pybullet.GEOM_MESH,
                 fileName=str(path),
-                rgbaColor=(*material.colour, 1.0),
+                rgbaColor=(*colour.tolist(), 1.0),
                 specularColor=(0.0, 0.0, 0.0),
                 physicsClientId=self._client,
             )

@@ -4,10 +4,10 @@ from follow_env.scene import Box, Light, Material, Scene
 
 WALL = Material((0.86, 0.84, 0.78))
 SKIRTING = Material((0.32, 0.30, 0.28))
-DOOR = Material((0.50, 0.33, 0.20), 0.2)
+DOOR = Material((0.50, 0.33, 0.20), 0.2, "wood")
 FRAME = Material((0.92, 0.92, 0.90))
 CEILING = Material((0.95, 0.95, 0.95))
-FLOOR = Material((0.62, 0.62, 0.60), 0.4)
+FLOOR = Material((0.62, 0.62, 0.60), 0.4, "tiles")
 LAMP = Material((1.0, 1.0, 0.95))
 RADIATOR = Material((0.93, 0.93, 0.95))
 

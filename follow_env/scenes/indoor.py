@@ -3,15 +3,16 @@
 from follow_env.scene import Box, Cylinder, Light, Material, Scene
 
 WALL = Material((0.88, 0.87, 0.82))
+BRICK = Material((0.66, 0.45, 0.36), texture="brick")
 CEILING = Material((0.95, 0.95, 0.95))
-FLOOR = Material((0.55, 0.45, 0.34), 0.2)
-WOOD = Material((0.62, 0.44, 0.27), 0.2)
+FLOOR = Material((0.55, 0.45, 0.34), 0.2, "carpet")
+WOOD = Material((0.62, 0.44, 0.27), 0.2, "wood")
 STEEL = Material((0.55, 0.57, 0.60), 0.5)
 DARK = Material((0.15, 0.15, 0.17))
 SCREEN = Material((0.05, 0.06, 0.10), 0.6)
 FABRIC = Material((0.20, 0.32, 0.50))
 RED = Material((0.65, 0.20, 0.18))
-BOOKS = Material((0.45, 0.30, 0.42))
+BOOKS = Material((0.45, 0.30, 0.42), texture="spines")
 LEAF = Material((0.16, 0.42, 0.18))
 POT = Material((0.58, 0.35, 0.24))
 CARTON = Material((0.72, 0.58, 0.40))
@@ -26,8 +27,8 @@ def indoor() -> Scene:
     parts: list[Box | Cylinder] = [
         Box((middle, HALF + 0.05, HEIGHT / 2), (length, 0.1, HEIGHT), WALL),
         Box((middle, -HALF - 0.05, HEIGHT / 2), (length, 0.1, HEIGHT), WALL),
-        Box((X0 - 0.05, 0.0, HEIGHT / 2), (0.1, 2 * HALF + 0.2, HEIGHT), WALL),
-        Box((X1 + 0.05, 0.0, HEIGHT / 2), (0.1, 2 * HALF + 0.2, HEIGHT), WALL),
+        Box((X0 - 0.05, 0.0, HEIGHT / 2), (0.1, 2 * HALF + 0.2, HEIGHT), BRICK),
+        Box((X1 + 0.05, 0.0, HEIGHT / 2), (0.1, 2 * HALF + 0.2, HEIGHT), BRICK),
         Box((middle, 0.0, HEIGHT + 0.05), (length, 2 * HALF + 0.2, 0.1), CEILING),
     ]
     for x, y, yaw in ((1.5, 2.6, 0.1), (5.2, -2.7, -0.15), (8.8, 2.7, 0.0), (12.4, -2.6, 0.1), (15.6, 2.5, -0.1)):

@@ -93,10 +93,7 @@ def test_actions_stay_in_the_action_space():
 def test_every_perception_reads_its_observation_and_agrees_with_the_truth(perception, scene):
     from baselines.policy import OBSERVATION_OF
 
-    camera = {"width": 160, "height": 120}
-    env = gym.make(
-        follow_env.IDS[scene], obs=OBSERVATION_OF[perception], sensor="ideal", camera=camera, disable_env_checker=True
-    )
+    env = gym.make(follow_env.IDS[scene], obs=OBSERVATION_OF[perception], sensor="ideal", disable_env_checker=True)
     obs, info = env.reset(seed=3)
 
     measurement, twist = make_perception(perception)(obs)

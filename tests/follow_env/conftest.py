@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import follow_env
-from follow_env.person import body
 
 
 @pytest.fixture
@@ -90,20 +89,3 @@ def window(monkeypatch):
     )
     monkeypatch.setitem(sys.modules, "pygame", pygame)
     return shown
-
-
-@pytest.fixture(scope="session")
-def vertices():
-    """World vertices (n, 3) of every segment by name: each mesh moved by its pose's quaternion and position."""
-
-    def place(person):
-        placed = {}
-        for segment, (position, (x, y, z, w)) in zip(body.segments(), person, strict=True):
-            axis = np.array((x, y, z))
-            assert x * x + y * y + z * z + w * w == pytest.approx(1.0)
-            points, _, _ = segment.mesh()
-            turned = points + 2.0 * np.cross(axis, np.cross(axis, points) + w * points)
-            placed[segment.name] = turned + np.array(position)
-        return placed
-
-    return place

@@ -107,13 +107,14 @@ def resident():
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs Linux's /proc")
 @pytest.mark.parametrize(("obs", "resets"), [("measurement", 200), ("rgbd_box", 80)])
 def test_resets_do_not_leak(make, obs, resets):
-    """Less than 5 MB of growth, clothes changed each time (which makes the renderer anew) once there are pixels."""
+    """Less than 5 MB of growth, with another body in another outfit each time."""
     env = make(INDOOR, obs=obs)
-    clothes = itertools.cycle(("blue", "green", "orange"))
+    dressed = itertools.cycle(itertools.product(("man", "woman", "child"), ("blue", "stripes")))
 
     def use(times):
         for seed in range(times):
-            env.reset(seed=seed, options={"person": next(clothes)})
+            body, outfit = next(dressed)
+            env.reset(seed=seed, options={"person": body, "outfit": outfit})
             for _ in range(3):
                 env.step(STOP)
 
@@ -268,13 +269,13 @@ def test_a_sensor_can_be_chosen_for_one_episode(make, equal):
     assert abs(usual[1] - info["distance"]) > 0.05
 
 
-def test_clothes_can_be_chosen_for_one_episode(make):
-    env = make(obs="rgbd", person="blue", route="standing")
+def test_an_outfit_can_be_chosen_for_one_episode(make):
+    env = make(obs="rgbd", outfit="blue", route="standing")
     dressed = {}
-    for clothes in ("green", "orange", None):
-        observation, _ = env.reset(seed=2, options={"person": clothes} if clothes else None)
+    for outfit in ("green", "orange", None):
+        observation, _ = env.reset(seed=2, options={"outfit": outfit} if outfit else None)
         mask = env.frame().ids == 1
-        dressed[clothes] = observation["rgb"][mask].mean(axis=0)
+        dressed[outfit] = observation["rgb"][mask].mean(axis=0)
     assert dressed["orange"][0] > dressed[None][0] + 20.0
     assert dressed[None][2] > dressed["orange"][2] + 20.0
     assert dressed["green"][1] > dressed["green"][2]
@@ -285,7 +286,8 @@ def test_clothes_can_be_chosen_for_one_episode(make):
     [
         ({"rout": "paper"}, ("'rout'", "did you mean 'route'")),
         ({"route": "papr"}, ("'papr'", "did you mean 'paper'")),
-        ({"person": "bleu"}, ("'bleu'", "did you mean 'blue'")),
+        ({"person": "wman"}, ("'wman'", "did you mean 'woman'")),
+        ({"outfit": "bleu"}, ("'bleu'", "did you mean 'blue'")),
         ({"sensor": {"measurement": {"mis_share": 0.5}}}, ("'mis_share'", "did you mean 'miss_share'")),
         ({"robot_pose": (1.0, 2.0)}, ("(1.0, 2.0)", "three finite numbers")),
         ({"robot_pose": (1.0, 2.0, math.nan)}, ("nan", "three finite numbers")),

@@ -58,7 +58,7 @@ def test_different_seeds_give_different_episodes(make, episode):
 
 @pytest.mark.parametrize("obs", ["measurement", "rgbd_box"])
 def test_an_episode_does_not_depend_on_what_was_played_before(make, equal, episode, obs):
-    """The same seed after nothing, other routes, clothes and sensors, a crash, a part of an episode, and `close`."""
+    """The same seed after nothing, other routes, people and sensors, a crash, a part of an episode, and `close`."""
     length = 420 if obs == "measurement" else 60
     wanted = episode(make(INDOOR, obs=obs), seed=5, steps=length)
     env = make(INDOOR, obs=obs)
@@ -75,7 +75,7 @@ def test_an_episode_does_not_depend_on_what_was_played_before(make, equal, episo
         "another seed": lambda: episode(env, seed=6, steps=length),
         "another route": lambda: episode(env, 2, {"route": "straight"}, steps=50),
         "other options": lambda: episode(
-            env, 3, {"person": "orange", "sensor": "ideal", "robot_pose": (1.0, 0.5, 1.0)}, steps=20
+            env, 3, {"person": "woman", "outfit": "orange", "sensor": "ideal", "robot_pose": (1.0, 0.5, 1.0)}, steps=20
         ),
         "a crash": crash,
         "half an episode": lambda: episode(env, seed=5, steps=33),

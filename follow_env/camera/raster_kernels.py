@@ -1,0 +1,239 @@
+# mypy: disable-error-code="no-untyped-def"
+"""The compiled picture: `draw` goes through the tiles of a picture, `halve` averages 2 x 2 pixels."""
+
+import sys
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numba.core import event
+
+from follow_env.camera.raster_fill import DEPTH, DISTANCE, PIXELS, TILE, clear, fill_cylinder, fill_facet, fill_triangle
+from follow_env.camera.raster_people import find_triangles
+from follow_env.camera.raster_scene import CYLINDER_PARTS, FACES
+from follow_env.camera.raster_setup import find_cylinders, find_facets
+from follow_env.camera.raster_shade import BACKGROUND, shade_surface, shade_triangle
+
+
+def _digest() -> int:
+    """Return a checksum of the kernels' sources.
+
+    Numba's cache looks only at the file of the cached function itself. The checksum is a closure variable of `draw`,
+    and so part of its cache key: a change in any of the other files is noticed as well.
+    """
+    digest = 0
+    for path in sorted([*Path(__file__).parent.glob("raster_*.py"), Path(__file__).parent / "textures.py"]):
+        digest = zlib.crc32(path.read_bytes(), digest)
+    return digest
+
+
+def _compiled(sources: int) -> Callable[..., int]:
+    @njit(cache=True, nogil=True, error_model="numpy")
+    def draw(view, scene, people, work, first_row, last_row, coloured, rgb, depth, ids):
+        """Draw the rows of tiles `first_row` <= row < `last_row`; return 0, or -1 if a vertex is not finite.
+
+        Args:
+            view: `View`.
+            scene: `ScenePack`.
+            people: `PeoplePack`.
+            work: `Workspace`.
+            first_row: first row of tiles.
+            last_row: the row of tiles after the last.
+            coloured: whether `rgb` is wanted.
+            rgb: (H, W, 3) uint8, out.
+            depth: (H, W) float32, out, m.
+            ids: (H, W) uint8, out.
+        """
+        key = sources  # noqa: F841  captured, hence part of the cache key
+        facets = find_facets(view, scene.boxes, work)
+        rounds = find_cylinders(view, scene.cylinders, work)
+        triangles = find_triangles(view, people, scene, work)
+        if triangles < 0:
+            return -1
+        starts, entries = _sort_into_tiles(triangles, view, work.triangle_places)
+        for row in range(first_row, last_row):
+            count = 0
+            for k in range(facets):
+                f = work.order[k]
+                if work.places[f, 3] <= row <= work.places[f, 4]:
+                    work.row[count] = f
+                    count += 1
+            for column in range(view.columns):
+                n = row * view.columns + column
+                inside = entries[starts[n] : starts[n + 1]]
+                _fill_tile(row, column, view, scene, work, count, rounds, inside)
+                _write_tile(row, column, view, scene, people, work, inside.size, coloured, rgb, depth, ids)
+        return 0
+
+    return draw
+
+
+# Inlined by force: handing over a record of arrays costs more than drawing a tile.
+_inline = njit(nogil=True, error_model="numpy", forceinline=True)
+
+
+@_inline
+def _sort_into_tiles(triangles, view, places):
+    """Return (starts, entries): the triangles of tile n are entries[starts[n] : starts[n + 1]]."""
+    columns = view.columns
+    starts = np.zeros(view.rows * columns + 2, np.int32)
+    for k in range(triangles):
+        for row in range(places[k, 3] // TILE, places[k, 4] // TILE + 1):
+            for column in range(places[k, 1] // TILE, places[k, 2] // TILE + 1):
+                starts[row * columns + column + 2] += 1
+    for n in range(2, starts.size):
+        starts[n] += starts[n - 1]
+    entries = np.empty(starts[-1], np.int32)
+    for k in range(triangles):
+        for row in range(places[k, 3] // TILE, places[k, 4] // TILE + 1):
+            for column in range(places[k, 1] // TILE, places[k, 2] // TILE + 1):
+                n = row * columns + column + 1
+                entries[starts[n]] = k
+                starts[n] += 1
+    return starts, entries
+
+
+@_inline
+def _fill_tile(row, column, view, scene, work, count, rounds, inside):
+    """Find what a tile sees among the first `count` facets of `work.row`, the cylinders and the triangles `inside`."""
+    lanes, seen = work.lanes, work.seen
+    background, limit = np.float32(1.0 / view.far), np.float32(1.0 / view.near)
+    left, top = view.left + column * TILE * view.step, view.top + row * TILE * view.step
+    clear(lanes, seen, left, top, view.step, background)
+    facets, places, order = work.facets, work.places, work.row
+    floor = background
+    for k in range(count):
+        f = order[k]
+        if places[f, 1] <= column <= places[f, 2]:
+            floor = fill_facet(facets, f, places[f, 0], lanes, seen, limit, floor)
+    first = 1 + FACES * scene.boxes.shape[0]
+    cylinders, places = work.rounds, work.round_places
+    for k in range(rounds):
+        met = places[k, 1] <= column <= places[k, 2] and places[k, 3] <= row <= places[k, 4]
+        if met and cylinders[k, 5] > floor:
+            fill_cylinder(cylinders, k, np.int32(first + CYLINDER_PARTS * places[k, 0]), lanes, seen, view.near)
+    first = scene.surfaces.shape[0]
+    triangles, places = work.triangles, work.triangle_places
+    for t in inside:
+        upper, lower = max(places[t, 3] - row * TILE, 0), min(places[t, 4] - row * TILE, TILE - 1)
+        fill_triangle(triangles, t, upper, lower, np.int32(first + t), lanes, seen, limit)
+
+
+@_inline
+def _colour_tile(height, width, view, scene, people, work):
+    """Write the colours of the first `height` rows and `width` columns of a tile into `work.colours`.
+
+    A surface of the scene is shaded once, from the first to the last row that shows it.
+    """
+    lanes, seen, colours, triangles, places = work.lanes, work.seen, work.colours, work.triangles, work.triangle_places
+    pattern, albedo = people.pattern, people.colours
+    surfaces, textures, lamps, ambient = scene.surfaces, scene.textures, scene.lamps, scene.ambient
+    static = surfaces.shape[0]
+    done, number_done = work.done, 0
+    previous = np.int32(-1)
+    for i in range(height):
+        for j in range(width):
+            k = np.uint64(i * TILE + j)
+            number = seen[k]
+            if number == previous:
+                continue
+            if number >= static:
+                t = number - static
+                f = places[t, 0]
+                red, green, blue = albedo[f, 0], albedo[f, 1], albedo[f, 2]
+                colours[k] = shade_triangle(k, t, pattern[f], red, green, blue, triangles, lanes)
+                continue
+            if number == 0:
+                colours[k] = BACKGROUND
+                continue
+            previous = number
+            known = False
+            for n in range(number_done):
+                known |= done[n] == number
+            if known:
+                continue
+            done[number_done] = number
+            number_done += 1
+            start, stop = np.uint64(i * TILE), np.uint64(_last_row(seen, number, i, height) * TILE + TILE)
+            texture = textures[number]
+            shade_surface(number, start, stop, view, surfaces, texture, lamps, ambient, lanes, seen, colours)
+
+
+@_inline
+def _last_row(seen, number, first, height):
+    """Return the last row of the tile, from `first` on, in which `number` is seen."""
+    for i in range(height - 1, first, -1):
+        for j in range(np.uint64(TILE)):
+            if seen[np.uint64(TILE * i) + j] == number:
+                return i
+    return first
+
+
+@_inline
+def _write_tile(row, column, view, scene, people, work, triangles, coloured, rgb, depth, ids):
+    """Copy a tile, in which `triangles` may be seen, to the picture."""
+    lanes, seen, colours, places, names = work.lanes, work.seen, work.colours, work.triangle_places, people.ids
+    x0, y0 = np.uint64(column * TILE), np.uint64(row * TILE)
+    width, height = min(TILE, view.width - column * TILE), min(TILE, view.height - row * TILE)
+    columns, rows = np.uint64(width), np.uint64(height)
+    static = scene.surfaces.shape[0]
+    far = np.float32(view.far)
+    for k in range(PIXELS):
+        lanes[DISTANCE + k] = np.float32(1.0) / lanes[DEPTH + k] if seen[k] else far
+    for i in range(rows):
+        for j in range(columns):
+            depth[y0 + i, x0 + j] = lanes[DISTANCE + np.uint64(TILE) * i + j]
+        for j in range(columns):
+            ids[y0 + i, x0 + j] = 0
+    if triangles:
+        for i in range(rows):
+            for j in range(columns):
+                number = seen[np.uint64(TILE) * i + j]
+                if number >= static:
+                    ids[y0 + i, x0 + j] = names[places[number - static, 0]]
+    if coloured:
+        _colour_tile(height, width, view, scene, people, work)
+        for i in range(rows):
+            for j in range(columns):
+                colour = colours[np.uint64(TILE) * i + j]
+                rgb[y0 + i, x0 + j, 0] = np.uint8(colour)
+                rgb[y0 + i, x0 + j, 1] = np.uint8(colour >> np.uint32(8))
+                rgb[y0 + i, x0 + j, 2] = np.uint8(colour >> np.uint32(16))
+
+
+draw = _compiled(_digest())
+
+
+@njit(cache=True, nogil=True)
+def halve(fine, rgb):
+    """Average 2 x 2 pixels of `fine` (2 H, 2 W, 3) uint8 into `rgb` (H, W, 3) uint8, rounded."""
+    for i in range(rgb.shape[0]):
+        for j in range(rgb.shape[1]):
+            for k in range(3):
+                total = 2 + fine[2 * i, 2 * j, k] + fine[2 * i, 2 * j + 1, k]
+                rgb[i, j, k] = (total + fine[2 * i + 1, 2 * j, k] + fine[2 * i + 1, 2 * j + 1, k]) >> 2
+
+
+class _Announcer(event.Listener):
+    """Says once that the camera is being compiled."""
+
+    announced = False
+
+    def on_start(self, event: Any) -> None:
+        if not _Announcer.announced:
+            _Announcer.announced = True
+            print("compiling the camera, once", file=sys.stderr, flush=True)
+
+    def on_end(self, event: Any) -> None:
+        """Nothing is said at the end."""
+
+
+@contextmanager
+def announced() -> Iterator[None]:
+    """Say on stderr, once, if what runs inside has to be compiled because the cache is empty or stale."""
+    with event.install_listener("numba:compile", _Announcer()):
+        yield

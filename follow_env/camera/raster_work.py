@@ -1,0 +1,100 @@
+"""What the kernels are given: the view, the people as one mesh, and the buffers of a thread."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from follow_env.camera.raster_fill import PLANES, TILE
+from follow_env.camera.raster_people import TRIANGLE_NUMBERS
+from follow_env.camera.raster_scene import FACES, ScenePack
+from follow_env.camera.raster_setup import FACET_NUMBERS
+
+
+class View(NamedTuple):
+    """A camera: place (m), cosine and sine of the yaw, clipping (m), slopes of the field of view's edges, pixel grid.
+
+    The ray (X, Y, 1) of pixel (i, j) is (left + j step, top + i step, 1).
+    """
+
+    x: float
+    y: float
+    z: float
+    cosine: float
+    sine: float
+    near: float
+    far: float
+    wide: float
+    high: float
+    left: float
+    top: float
+    step: float
+    width: int
+    height: int
+    columns: int
+    rows: int
+
+
+class PeoplePack(NamedTuple):
+    """All people of a picture as one mesh; `starts` (P + 1, 2) are the first vertex and face of each."""
+
+    vertices: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+    colours: np.ndarray
+    pattern: np.ndarray
+    anchors: np.ndarray
+    ids: np.ndarray
+    starts: np.ndarray
+
+
+class Workspace(NamedTuple):
+    """Buffers of one thread, used again for every picture."""
+
+    lanes: np.ndarray
+    seen: np.ndarray
+    colours: np.ndarray
+    corners: np.ndarray
+    quad: np.ndarray
+    bounds: np.ndarray
+    facets: np.ndarray
+    places: np.ndarray
+    order: np.ndarray
+    row: np.ndarray
+    done: np.ndarray
+    rounds: np.ndarray
+    round_places: np.ndarray
+    camera_points: np.ndarray
+    vertex_light: np.ndarray
+    triangles: np.ndarray
+    triangle_places: np.ndarray
+
+
+def make_workspace(scene: ScenePack, vertices: int, faces: int) -> Workspace:
+    """Return buffers for `scene` and people of so many vertices and faces in all."""
+    facets, rounds = FACES * len(scene.boxes), len(scene.cylinders)
+
+    def real(*shape: int) -> np.ndarray:
+        return np.zeros(shape, np.float32)
+
+    def whole(*shape: int) -> np.ndarray:
+        return np.zeros(shape, np.int32)
+
+    return Workspace(
+        real(PLANES * TILE * TILE),
+        whole(TILE * TILE),
+        np.zeros(TILE * TILE, np.uint32),
+        np.zeros((8, 3)),
+        np.zeros((4, 3)),
+        np.zeros(4),
+        real(facets, FACET_NUMBERS),
+        whole(facets, 5),
+        whole(facets),
+        whole(facets),
+        whole(TILE * TILE),
+        np.zeros((rounds, 8)),
+        whole(rounds, 5),
+        np.zeros((vertices, 3)),
+        real(vertices),
+        real(faces + 1, TRIANGLE_NUMBERS),
+        whole(faces + 1, 5),
+    )

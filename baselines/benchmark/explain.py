@@ -86,7 +86,10 @@ def _bias_share(none: PooledError, quantity: str) -> str:
     start = f"Bias ({bias} {unit}) makes {share:.0%} of No filter's squared error"
     if share < 0.5:
         return f"{start}, spread ({spread} {unit}) the rest."
-    return f"{start} and smoothing does not remove it: without any spread the ratio would still be {share**0.5:.2f}."
+    return (
+        f"{start}: averaging leaves it, only a filter's lag or rejection shifts it; "
+        f"unshifted and without any spread the ratio would be {share**0.5:.2f}."
+    )
 
 
 def _filter_effect(error: PooledError, none: PooledError, estimator: str, quantity: str) -> str:

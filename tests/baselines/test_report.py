@@ -80,7 +80,7 @@ def test_bias_that_dominates_is_named_with_its_share_and_the_lag() -> None:
     assert text is not None
     assert "KF < No filter does not hold; AKF < KF does not hold; the KF ratio is 1.49 (paper 0.83)" in text
     assert "Bias (-11.20 cm) makes 83% of No filter's squared error" in text
-    assert "without any spread the ratio would still be 0.91" in text
+    assert "unshifted and without any spread the ratio would be 0.91" in text
     effect = "The KF takes bias from -11.20 to -18.00 cm and spread from 5.00 to 3.00 cm"
     assert f"{effect}: more bias added than spread removed." in text
     assert "The AKF finds no outlier in any episode and does what the KF does." in text

@@ -22,6 +22,22 @@ def _require(what: str, settings: Any, names: Iterable[str], above_zero: bool = 
             raise ValueError(f"{what} {name} is {value!r}; expected a finite value {'>' if above_zero else '>='} 0")
 
 
+def _require_shares(what: str, settings: Any, names: Iterable[str]) -> None:
+    """Raise a ValueError unless each of the settings is from 0 to 1."""
+    for name in names:
+        value = getattr(settings, name)
+        if not 0.0 <= value <= 1.0:
+            raise ValueError(f"{what} {name} is {value!r}; expected a share from 0 to 1")
+
+
+def _require_share_below_one(what: str, settings: Any, names: Iterable[str]) -> None:
+    """Raise a ValueError unless each of the settings is from 0 to below 1."""
+    for name in names:
+        value = getattr(settings, name)
+        if not 0.0 <= value < 1.0:
+            raise ValueError(f"{what} {name} is {value!r}; expected a share from 0 to below 1")
+
+
 @dataclasses.dataclass(frozen=True)
 class RobotConfig:
     """The differential-drive robot of paper B (section 3): two driven front wheels, one rear caster.
@@ -91,30 +107,99 @@ class CameraConfig:
 class DepthConfig:
     """Errors of a structured-light depth sensor (Xtion/Kinect), applied to the rendered depth.
 
+    The formulas are in `follow_env.camera.sensor.RGBDSensor`. The defaults: noise as measured by Nguyen et al. (2012,
+    Kinect) for surfaces that face the camera; eighths of a pixel of disparity, 75 mm and the loss of the projector's
+    shadow as in Khoshelham and Elberink (2012, Kinect); 0.5 m because an Xtion returns nothing nearer, 8 m because it
+    quantises to 0.2 m there. The shares lost at edges, on dark and on grazing surfaces are stated, not measured.
+
     Attributes:
         axial_noise: scale on the axial noise 0.0012 + 0.0019 (z - 0.4)^2 m of Nguyen et al. (2012); 0 switches it off.
+        lateral_noise: standard deviation on each axis of the place that a pixel's depth is taken from, px at 640 px
+            width (Nguyen et al.: 0.8 when facing, 0.9 at 60 degrees).
         disparity_step: quantisation of the disparity, px, at 640 px width (Xtion: 1/8); 0 switches it off.
         baseline: between projector and camera, m.
         min_range, max_range: depth outside is reported as 0 (no reading), m.
-        edge_band: pixels at which the depth jumps by more than `edge_jump` within this distance (px) read 0.
+        edge_band: a pixel is at an edge if the depth within this distance (px of the picture) jumps by more than
+            `edge_jump`.
         edge_jump: as a share of the depth, at least of 1 m.
+        edge_holes: share of the pixels at an edge that read 0.
+        edge_flying: share of the pixels at an edge that read a depth between foreground and background.
+        shadow: share of the pixels lost where something hides the surface from the projector.
+        dark_level: luminance below which readings get lost, grey levels.
+        dark_dropout: share lost at luminance 0; falls linearly to 0 at `dark_level`.
+        grazing_deg: angle between ray and surface normal above which readings get lost, degrees.
+        grazing_dropout: share lost at 90 degrees; falls to 0 at `grazing_deg`, linearly in the cosine.
     """
 
     axial_noise: float = 1.0
+    lateral_noise: float = 0.8
     disparity_step: float = 0.125
     baseline: float = 0.075
     min_range: float = 0.5
     max_range: float = 8.0
     edge_band: int = 1
     edge_jump: float = 0.15
+    edge_holes: float = 0.5
+    edge_flying: float = 0.1
+    shadow: float = 1.0
+    dark_level: float = 40.0
+    dark_dropout: float = 0.5
+    grazing_deg: float = 75.0
+    grazing_dropout: float = 1.0
 
     def __post_init__(self) -> None:
-        _require("depth", self, ("axial_noise", "disparity_step", "min_range", "edge_band", "edge_jump"))
-        _require("depth", self, ("baseline",), above_zero=True)
+        _require("depth", self, ("axial_noise", "lateral_noise", "disparity_step", "min_range"))
+        _require("depth", self, ("edge_band", "edge_jump"))
+        _require("depth", self, ("baseline", "dark_level"), above_zero=True)
+        _require_shares("depth", self, ("edge_holes", "edge_flying", "shadow", "dark_dropout", "grazing_dropout"))
+        if self.edge_holes + self.edge_flying > 1.0:
+            raise ValueError(
+                f"depth edge_holes, edge_flying are {self.edge_holes!r}, {self.edge_flying!r}; expected a sum up to 1"
+            )
+        if not 0.0 <= self.grazing_deg < 90.0:
+            raise ValueError(f"depth grazing_deg is {self.grazing_deg!r}; expected degrees from 0 to below 90")
         if not self.min_range < self.max_range:
             raise ValueError(
                 f"depth min_range, max_range are {self.min_range!r}, {self.max_range!r}; expected min_range < max_range"
             )
+
+
+@dataclasses.dataclass(frozen=True)
+class ColourConfig:
+    """Errors of the colour camera, applied to the rendered picture.
+
+    The defaults are those of a small webcam sensor in a lit room: stated, not measured.
+
+    Attributes:
+        read_noise: standard deviation of the noise in the dark, grey levels.
+        shot_noise: standard deviation of the noise that grows with the root of the light, grey levels at level 1.
+        blur: standard deviation of the Gaussian blur, px at 640 px width.
+        gain: exposure; what exceeds 255 is cut.
+    """
+
+    read_noise: float = 1.0
+    shot_noise: float = 0.12
+    blur: float = 0.6
+    gain: float = 1.0
+
+    def __post_init__(self) -> None:
+        _require("colour", self, (field.name for field in dataclasses.fields(self)))
+        if self.blur > 50.0:
+            raise ValueError(f"colour blur is {self.blur!r}; expected up to 50 px")
+
+
+@dataclasses.dataclass(frozen=True)
+class FrameConfig:
+    """Loss of whole frames on the way from the camera.
+
+    Attributes:
+        drop_share: share of the frames that never arrive, in [0, 1); the first of an episode always does.
+    """
+
+    drop_share: float = 0.0
+
+    def __post_init__(self) -> None:
+        _require_share_below_one("frames", self, ("drop_share",))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -166,10 +251,7 @@ class MeasurementConfig:
     miss_share: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("outlier_share", "miss_share"):
-            value = getattr(self, name)
-            if not 0.0 <= value < 1.0:
-                raise ValueError(f"measurement {name} is {value!r}; expected a share from 0 to below 1")
+        _require_share_below_one("measurement", self, ("outlier_share", "miss_share"))
         _require("measurement", self, ("bearing_noise", "distance_noise", "outlier_duration_s"))
         _require("measurement", self, ("bearing_correlation_s", "distance_correlation_s"))
         for name in ("bearing_bias", "distance_bias"):
@@ -184,19 +266,57 @@ class MeasurementConfig:
 
 @dataclasses.dataclass(frozen=True)
 class SensorConfig:
-    """All sensor errors: `depth` and `box` act on rendered frames, `measurement` on the `measurement` observation."""
+    """All sensor errors.
+
+    `depth`, `colour`, `frames` and `box` act on rendered frames, `measurement` on the `measurement` observation.
+    """
 
     depth: DepthConfig = DepthConfig()
+    colour: ColourConfig = ColourConfig()
+    frames: FrameConfig = FrameConfig()
     box: BoxConfig = BoxConfig()
     measurement: MeasurementConfig = MeasurementConfig()
 
 
 IDEAL_SENSOR = SensorConfig(
-    DepthConfig(axial_noise=0.0, disparity_step=0.0, min_range=0.0, max_range=math.inf, edge_band=0),
+    DepthConfig(
+        axial_noise=0.0,
+        lateral_noise=0.0,
+        disparity_step=0.0,
+        min_range=0.0,
+        max_range=math.inf,
+        edge_band=0,
+        shadow=0.0,
+        dark_dropout=0.0,
+        grazing_dropout=0.0,
+    ),
+    ColourConfig(read_noise=0.0, shot_noise=0.0, blur=0.0),
+    FrameConfig(),
     BoxConfig(centre_jitter=0.0, size_jitter=0.0),
     MeasurementConfig(bearing_noise=0.0, distance_bias=0.0, distance_noise=0.0),
 )
-SENSORS = {"xtion": SensorConfig(), "ideal": IDEAL_SENSOR}
+"""No errors at all."""
+HARSH_SENSOR = SensorConfig(
+    DepthConfig(
+        axial_noise=2.0,
+        lateral_noise=1.6,
+        min_range=0.8,
+        max_range=5.0,
+        edge_band=2,
+        edge_holes=0.6,
+        edge_flying=0.3,
+        dark_level=80.0,
+        dark_dropout=0.9,
+        grazing_deg=60.0,
+    ),
+    ColourConfig(read_noise=4.0, shot_noise=0.4, blur=2.0, gain=0.6),
+    FrameConfig(drop_share=0.1),
+    BoxConfig(centre_jitter=0.06, size_jitter=0.08),
+    MeasurementConfig(bearing_noise=0.024, distance_noise=0.03, outlier_share=0.05, miss_share=0.1),
+)
+"""A bad day: sunlight on the pattern, dim light for the colours, a busy bus. Stated, not measured: about twice the
+noise, half the range, one frame in ten lost."""
+SENSORS = {"xtion": SensorConfig(), "xtion_harsh": HARSH_SENSOR, "ideal": IDEAL_SENSOR}
 """Named sensors."""
 
 
@@ -235,9 +355,15 @@ def build(what: str, base: T, data: Mapping[str, Any] | None) -> T:
 
 
 def sensor_config(value: str | Mapping[str, Any] | SensorConfig) -> SensorConfig:
-    """Return the sensor that `value` names, or the default sensor with the settings of a mapping replaced."""
+    """Return the sensor that `value` names, or one with the settings of a mapping replaced.
+
+    A mapping changes the default sensor, or the one that its entry `preset` names.
+    """
     if isinstance(value, SensorConfig):
         return value
     if isinstance(value, str):
         return SENSORS[choose("sensor", value, SENSORS)]
+    if isinstance(value, Mapping) and "preset" in value:
+        changes = {key: setting for key, setting in value.items() if key != "preset"}
+        return build("sensor", SENSORS[choose("sensor preset", value["preset"], SENSORS)], changes)
     return build("sensor", SensorConfig(), value)

@@ -3,14 +3,13 @@
 import math
 from collections import deque
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 
 from follow_env.camera import RENDERERS, CameraPose, PinholeCamera, Renderer, RGBDFrame, make_renderer
-from follow_env.camera.depth import DepthSensor
 from follow_env.config import CameraConfig, RobotConfig, SensorConfig, build, choose, sensor_config
 from follow_env.measurement import GaussMarkov, MeasurementModel
 from follow_env.person.bodies import BODIES, OUTFITS, load_body
@@ -27,6 +26,9 @@ from follow_env.reward import (
 from follow_env.routes import ROUTES, Route, make_route
 from follow_env.scenes import make_scene
 from follow_env.view import Dashboard, import_pygame, show_window
+
+if TYPE_CHECKING:
+    from follow_env.camera.sensor import RGBDSensor
 
 OBSERVATIONS = ("measurement", "state", "rgbd", "rgbd_box", "rgbd_uint8")
 ACTIONS = ("twist", "wheels")
@@ -59,10 +61,12 @@ class FollowEnv(gymnasium.Env):
       omega, last action.
     - `"rgbd"` Dict: `rgb` uint8 (H, W, 3), `depth` float32 (H, W) m (0 = no reading), `twist` float32 (2,) odometry.
     - `"rgbd_box"`: the same and `box` float32 (4,) = (u0, v0, u1, v1) px, the person's visible box with the stated
-      jitter; zeros when the person is not detected. The `mask` rung of the benchmark. With latency, the first frame
-      stands, without a box, until it is old enough.
+      jitter; zeros when the person is not detected. The `mask` rung of the benchmark.
     - `"rgbd_uint8"`: uint8 (H, W, 4), the depth as 255 (1 - z / 8 m), 0 = no reading or beyond; the metric depth
       stays in `info["depth"]`.
+
+    With pictures, `info["frame_time"]` (s) is when the observed one was taken. When a frame is dropped, the one before
+    stands with its time, without a box; so does the first one, with latency, until it is old enough.
 
     **Reward**: sum of the bounded terms in `info["rewards"]` (`follow_env.reward`).
 
@@ -73,8 +77,8 @@ class FollowEnv(gymnasium.Env):
         obs: see above.
         action: `"twist"` or `"wheels"`.
         route: `"paper"` (12 m in 14 s, turns up to 50 deg), `"straight"` or `"standing"`.
-        sensor: `"xtion"`, `"ideal"` or a mapping of `SensorConfig` settings, for example
-            `{"measurement": {"miss_share": 0.1}}`.
+        sensor: `"xtion"`, `"xtion_harsh"`, `"ideal"` or a mapping of `SensorConfig` settings that differ from those
+            of `"xtion"`, or of its entry `preset`: `{"preset": "ideal", "measurement": {"miss_share": 0.1}}`.
         camera: mapping of `CameraConfig` settings, e.g. `{"width": 320, "height": 240}`.
         robot: mapping of `RobotConfig` settings.
         renderer: `"raster"` (ours) or `"tiny"` (PyBullet's, slow, a cross-check: the person keeps the posture of
@@ -136,7 +140,7 @@ class FollowEnv(gymnasium.Env):
             )
         self.robot_config = build("robot", RobotConfig(), robot)
         self.camera = PinholeCamera(build("camera", CameraConfig(), camera))
-        self._sensor = sensor_config(sensor)
+        self._sensor = self._sensor_in_use = sensor_config(sensor)
         self.scene = make_scene(scene)
         self._world: World | None = None
         self._renderer: Renderer | None = None
@@ -145,6 +149,7 @@ class FollowEnv(gymnasium.Env):
         self.observation_space = self._make_observation_space()
         self._route: Route | None = None
         self.observed: RGBDFrame | None = None
+        self._rgbd_sensor: RGBDSensor | None = None
         self._dressed = (self._person, self._outfit)
         self._walker: Walker | None = None
 
@@ -302,8 +307,12 @@ class FollowEnv(gymnasium.Env):
 
     def _set_up_sensors(self, sensor: SensorConfig) -> None:
         self._measurement = MeasurementModel(sensor.measurement, self.dt)
-        self._depth_sensor = DepthSensor(sensor.depth, self.camera.hfov)
-        self._box_config = sensor.box
+        self._latest: tuple[RGBDFrame, float] | None = None
+        if self._obs.startswith("rgbd") and (self._rgbd_sensor is None or sensor != self._sensor_in_use):
+            from follow_env.camera.sensor import RGBDSensor  # compiled: only for those who look at pictures
+
+            self._rgbd_sensor = RGBDSensor(sensor.depth, sensor.colour, self.camera)
+        self._sensor_in_use = sensor
         self._box_error = GaussMarkov(4, sensor.box.correlation_s, self.dt)
         self._queue: deque[Any] = deque()
 
@@ -360,38 +369,59 @@ class FollowEnv(gymnasium.Env):
             self._last_measured = self.time - age
             bearing = min(max(seen[0], -math.pi), math.pi)
             return np.array((bearing, min(seen[1], MAX_DISTANCE), 1.0, age, *own), np.float32)
-        frame, box = self._delayed(self._sense()) or (self._queue[0][0], np.zeros(4, np.float32))
-        self.observed = frame
+        seen = self._delayed(self._sense())
+        if seen is None:
+            first, _, taken = self._queue[0]
+            seen = first, np.zeros(4, np.float32), taken
+        self.observed, box, self._frame_time = seen
         if self._obs == "rgbd_uint8":
-            near = np.where((frame.depth > 0.0) & (frame.depth < 8.0), 255.0 * (1.0 - frame.depth / 8.0), 0.0)
-            return np.dstack((frame.rgb, near.astype(np.uint8)))
-        observation = {"rgb": frame.rgb, "depth": frame.depth, "twist": np.array(self._twist, np.float32)}
+            from follow_env.camera.sensor import packed
+
+            return packed(self.observed)
+        twist = np.array(self._twist, np.float32)
+        observation = {"rgb": self.observed.rgb, "depth": self.observed.depth, "twist": twist}
         if self._obs == "rgbd_box":
             observation["box"] = box
         return observation
 
-    def _sense(self) -> tuple[RGBDFrame, np.ndarray]:
-        """Return the frame with sensor errors, and the person's jittered box (zeros when not detected)."""
-        truth = self.frame()
-        depth = np.minimum(self._depth_sensor.corrupt(truth.depth, self.np_random), np.float32(self.camera.config.far))
+    def _sense(self) -> tuple[RGBDFrame, np.ndarray, float]:
+        """Return the latest frame with sensor errors, the person's jittered box (zeros if not detected) and its time.
+
+        A dropped frame is not drawn at all. The count of random numbers does not depend on what is seen.
+        """
+        assert self._rgbd_sensor is not None
+        seed = int(self.np_random.integers(1 << 64, dtype=np.uint64))
+        dropped = float(self.np_random.random()) < self._sensor_in_use.frames.drop_share
         errors = self._box_error.step(self.np_random)
-        box = np.zeros(4, np.float32)
-        tight = truth.person_box(self._box_config.min_pixels)
-        if tight is not None:
-            u0, v0, u1, v1 = tight
-            width, height = u1 - u0, v1 - v0
-            u = 0.5 * (u0 + u1) + self._box_config.centre_jitter * errors[0] * width
-            v = 0.5 * (v0 + v1) + self._box_config.centre_jitter * errors[1] * height
-            half_w = 0.5 * width * max(1.0 + self._box_config.size_jitter * errors[2], 0.2)
-            half_h = 0.5 * height * max(1.0 + self._box_config.size_jitter * errors[3], 0.2)
-            limit_u, limit_v = float(self.camera.width), float(self.camera.height)
-            box[:] = (
-                min(max(u - half_w, 0.0), limit_u),
-                min(max(v - half_h, 0.0), limit_v),
-                min(max(u + half_w, 0.0), limit_u),
-                min(max(v + half_h, 0.0), limit_v),
-            )
-        return RGBDFrame(truth.rgb, depth, truth.ids), box
+        if dropped and self._latest is not None:
+            frame, taken = self._latest
+            return _copy(frame), np.zeros(4, np.float32), taken
+        truth = self.frame()
+        frame = self._rgbd_sensor.corrupt(truth, seed)
+        if self._sensor_in_use.frames.drop_share > 0.0:
+            self._latest = _copy(frame), self.time  # the caller may write into what was observed
+        box = self._jittered_box(truth, errors) if self._obs == "rgbd_box" else np.zeros(4, np.float32)
+        return frame, box, self.time
+
+    def _jittered_box(self, truth: RGBDFrame, errors: list[float]) -> np.ndarray:
+        config = self._sensor_in_use.box
+        tight = truth.person_box(config.min_pixels)
+        if tight is None:
+            return np.zeros(4, np.float32)
+        u0, v0, u1, v1 = tight
+        width, height = u1 - u0, v1 - v0
+        u = 0.5 * (u0 + u1) + config.centre_jitter * errors[0] * width
+        v = 0.5 * (v0 + v1) + config.centre_jitter * errors[1] * height
+        half_w = 0.5 * width * max(1.0 + config.size_jitter * errors[2], 0.2)
+        half_h = 0.5 * height * max(1.0 + config.size_jitter * errors[3], 0.2)
+        limit_u, limit_v = float(self.camera.width), float(self.camera.height)
+        corners = (
+            min(max(u - half_w, 0.0), limit_u),
+            min(max(v - half_h, 0.0), limit_v),
+            min(max(u + half_w, 0.0), limit_u),
+            min(max(v + half_h, 0.0), limit_v),
+        )
+        return np.array(corners, np.float32)
 
     def _delayed(self, value: Any) -> Any:
         """Return what was seen `latency_s` ago, or None while that was before the start."""
@@ -423,6 +453,8 @@ class FollowEnv(gymnasium.Env):
             "rewards": dict(self._rewards),
             "is_success": success,
         }
+        if self._obs.startswith("rgbd"):
+            info["frame_time"] = self._frame_time
         if self._obs == "rgbd_uint8":
             assert self.observed is not None
             info["depth"] = self.observed.depth
@@ -437,6 +469,10 @@ class FollowEnv(gymnasium.Env):
         self._dashboard.update(info, self.observed or self.frame())
         if self.render_mode == "human":
             show_window(self._dashboard.image(), 1.0 / self.dt)
+
+
+def _copy(frame: RGBDFrame) -> RGBDFrame:
+    return RGBDFrame(frame.rgb.copy(), frame.depth.copy(), frame.ids)
 
 
 def _pose(value: Any) -> tuple[float, float, float]:

@@ -22,7 +22,9 @@ class RGBDFrame:
     def person_box(self, min_pixels: int = 1) -> tuple[float, float, float, float] | None:
         """Return the tight box (u0, v0, u1, v1) of the person's visible pixels, in px; None below `min_pixels`."""
         mask = self.ids == 1
-        if int(mask.sum()) < max(min_pixels, 1):
+        if np.count_nonzero(mask) < max(min_pixels, 1):
             return None
-        columns, rows = np.flatnonzero(mask.any(axis=0)), np.flatnonzero(mask.any(axis=1))
-        return float(columns[0]), float(rows[0]), float(columns[-1] + 1), float(rows[-1] + 1)
+        width, flat = mask.shape[1], mask.reshape(-1)
+        top, bottom = int(flat.argmax()) // width, (flat.size - 1 - int(flat[::-1].argmax())) // width
+        columns = np.flatnonzero(np.logical_or.reduce(mask[top : bottom + 1], axis=0))
+        return float(columns[0]), float(top), float(columns[-1] + 1), float(bottom + 1)

@@ -10,11 +10,14 @@ import pytest
 
 import follow_env
 from follow_env.config import (
+    HARSH_SENSOR,
     IDEAL_SENSOR,
     SENSORS,
     BoxConfig,
     CameraConfig,
+    ColourConfig,
     DepthConfig,
+    FrameConfig,
     MeasurementConfig,
     RobotConfig,
     SensorConfig,
@@ -23,7 +26,10 @@ from follow_env.config import (
     sensor_config,
 )
 
-CONFIGS = (RobotConfig, CameraConfig, DepthConfig, BoxConfig, MeasurementConfig, SensorConfig)
+CONFIGS = (
+    *(RobotConfig, CameraConfig, DepthConfig, ColourConfig, FrameConfig, BoxConfig, MeasurementConfig),
+    SensorConfig,
+)
 
 
 def refusal(error, call, *arguments, **keywords):
@@ -90,6 +96,12 @@ def test_the_default_of_a_mapping_is_the_default_sensor():
     assert sensor_config(IDEAL_SENSOR) is IDEAL_SENSOR
 
 
+def test_a_mapping_may_start_from_a_preset():
+    harsher = sensor_config({"preset": "xtion_harsh", "colour": {"blur": 3.0}})
+    assert harsher == dataclasses.replace(HARSH_SENSOR, colour=dataclasses.replace(HARSH_SENSOR.colour, blur=3.0))
+    assert sensor_config({"preset": "ideal"}) == IDEAL_SENSOR
+
+
 def test_whole_numbers_may_come_as_floats_and_floats_as_whole_numbers():
     camera = build("camera", CameraConfig(), {"width": 320.0, "far": 20})
     assert (camera.width, camera.far) == (320, 20.0)
@@ -117,6 +129,8 @@ def test_numbers_from_numpy_are_numbers():
         ({"robot": {"track_widt": 0.4}}, ("'track_widt'", "did you mean 'track_width'")),
         ({"sensor": {"measurment": {}}}, ("'measurment'", "did you mean 'measurement'")),
         ({"sensor": {"measurement": {"mis_share": 0.1}}}, ("'mis_share'", "did you mean 'miss_share'")),
+        ({"sensor": {"preset": "ideel"}}, ("'ideel'", "did you mean 'ideal'")),
+        ({"sensor": {"colour": {"blurr": 1.0}}}, ("'blurr'", "did you mean 'blur'")),
         ({"sensor": {"depth": {"axial_nose": 1.0}}}, ("'axial_nose'", "did you mean 'axial_noise'")),
     ],
     ids=lambda value: str(value) if isinstance(value, dict) else "",
@@ -173,6 +187,18 @@ def test_a_name_like_no_other_is_refused_without_a_guess():
         ({"sensor": {"depth": {"disparity_step": -0.1}}}, "-0.1"),
         ({"sensor": {"depth": {"edge_band": -1}}}, "-1"),
         ({"sensor": {"depth": {"min_range": 5.0, "max_range": 1.0}}}, "5.0"),
+        ({"sensor": {"depth": {"lateral_noise": -0.1}}}, "-0.1"),
+        ({"sensor": {"depth": {"edge_holes": 0.7, "edge_flying": 0.4}}}, "0.7, 0.4"),
+        ({"sensor": {"depth": {"shadow": 1.1}}}, "1.1"),
+        ({"sensor": {"depth": {"dark_dropout": -0.1}}}, "-0.1"),
+        ({"sensor": {"depth": {"dark_level": 0.0}}}, "0.0"),
+        ({"sensor": {"depth": {"grazing_deg": 90.0}}}, "90.0"),
+        ({"sensor": {"depth": {"grazing_dropout": 2.0}}}, "2.0"),
+        ({"sensor": {"colour": {"read_noise": -1.0}}}, "-1.0"),
+        ({"sensor": {"colour": {"shot_noise": math.inf}}}, "inf"),
+        ({"sensor": {"colour": {"blur": 51.0}}}, "51.0"),
+        ({"sensor": {"colour": {"gain": -0.5}}}, "-0.5"),
+        ({"sensor": {"frames": {"drop_share": 1.0}}}, "1.0"),
         ({"sensor": {"box": {"centre_jitter": -0.1}}}, "-0.1"),
         ({"sensor": {"box": {"size_jitter": math.inf}}}, "inf"),
         ({"sensor": {"box": {"correlation_s": -0.1}}}, "-0.1"),

@@ -116,6 +116,7 @@ def test_returned_values_are_the_callers_own(make, equal):
 @every_environment
 def test_info_has_the_same_keys_and_types_always(make, episode, id_, obs):
     wanted = INFO_KEYS | ({"depth"} if obs == "rgbd_uint8" else set())
+    wanted |= {"frame_time"} if obs.startswith("rgbd") else set()
     env = make(id_, obs=obs, route="standing")
     record = episode(env, seed=0, policy=forward)
     assert record[-1][-1]["collision"]

@@ -45,11 +45,50 @@ def test_latency_delays_what_is_seen_by_exactly_so_many_steps(make, equal, episo
         elif obs == "rgbd_uint8":
             assert equal(seen, past), k
             assert equal(delayed[-1]["depth"], one[max(k - steps, 0)][-1]["depth"]), k
+            assert delayed[-1]["frame_time"] == one[max(k - steps, 0)][-1]["time"], k
         else:
             box = past["box"] if k >= steps else np.zeros(4, np.float32)
             assert equal({**seen, "twist": None}, {**past, "twist": None, "box": box}), k
             assert equal(seen["twist"], current["twist"]), k
-        assert equal({**delayed[-1], "depth": None}, {**prompt[-1], "depth": None}), "the truth is never delayed"
+        late_seen = {"depth": None, "frame_time": None}
+        assert equal({**delayed[-1], **late_seen}, {**prompt[-1], **late_seen}), "the truth is never delayed"
+
+
+@pytest.mark.parametrize("latency", [0.0, 0.1])
+def test_a_dropped_frame_is_the_one_before_and_says_so(make, equal, episode, latency):
+    """Against a twin that drops none; the picture that stands has its own time, and no box comes with it."""
+    settings = {"obs": "rgbd_box", "latency_s": latency}
+    whole, lossy = (make(INDOOR, sensor={"frames": {"drop_share": p}}, **settings) for p in (0.0, 0.4))
+    one, two = episode(whole, 3), episode(lossy, 3)
+    delay, taken, dropped = round(latency * 30.0), 0, []
+    for k, (prompt, late) in enumerate(zip(one, two, strict=True)):
+        seen, info = late[0], late[-1]
+        shown = round(info["frame_time"] * 30.0)
+        fresh = shown == k - delay
+        if k > delay:
+            assert shown == (k - delay if fresh else taken), "the frame before"
+            dropped.append(not fresh)
+        taken = shown
+        source = one[shown + delay][0]
+        assert equal({**seen, "twist": None, "box": None}, {**source, "twist": None, "box": None})
+        assert equal(seen["twist"], prompt[0]["twist"])
+        assert equal(seen["box"], prompt[0]["box"] if fresh else np.zeros(4, np.float32))
+        assert info["time"] == prompt[-1]["time"]
+    assert len(dropped) > 400
+    assert np.mean(dropped) == pytest.approx(0.4, abs=4.0 * math.sqrt(0.24 / len(dropped)))
+
+
+def test_one_seed_meets_the_same_errors_in_every_picture_mode(make, equal, episode):
+    """Also with drops, and whether a box is computed or not: the picture decides over no random number."""
+    records = {
+        obs: episode(make(INDOOR, obs=obs, sensor="xtion_harsh"), 3, steps=30)
+        for obs in ("rgbd", "rgbd_box", "rgbd_uint8")
+    }
+    for plain, boxed, packed in zip(*records.values(), strict=True):
+        assert equal(plain[0], {key: boxed[0][key] for key in plain[0]})
+        assert equal(np.ascontiguousarray(packed[0][:, :, :3]), plain[0]["rgb"])
+        assert equal(packed[-1]["depth"], plain[0]["depth"])
+        assert plain[-1]["frame_time"] == boxed[-1]["frame_time"] == packed[-1]["frame_time"]
 
 
 def test_the_age_of_a_measurement_is_the_time_since_it_was_taken(make, episode):
@@ -100,6 +139,15 @@ def test_rgbd_uint8_is_the_same_picture_in_bytes(make, equal):
     wanted = np.where((depth > 0.0) & (depth < 8.0), 255.0 * (1.0 - depth / 8.0), 0.0)
     assert np.abs(two[:, :, 3] - wanted).max() <= 1.0
     assert (depth == 0.0).any()
+
+
+def test_scribbling_on_a_picture_does_not_come_back_when_the_next_is_dropped(make, equal):
+    env, twin = (make(obs="rgbd", sensor={"frames": {"drop_share": 0.7}}) for _ in range(2))
+    (mine, _), (other, _) = env.reset(seed=1), twin.reset(seed=1)
+    for _ in range(20):
+        assert equal(mine, other)
+        mine["rgb"].fill(0), mine["depth"].fill(0)
+        mine, other = env.step(STOP)[0], twin.step(STOP)[0]
 
 
 def test_rgbd_tuple_is_what_the_robot_sees(make, equal):

@@ -1,0 +1,312 @@
+# mypy: disable-error-code="no-untyped-def"
+"""The compiled sensor errors: `corrupt_depth`, `corrupt_colour` and `pack_bytes`.
+
+Every column of a picture has its own xorshift generators, seeded by a hash of (frame, stream, column) and advanced from
+row to row: vectors of them need no multiplication, and the bits are the same on any processor.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+NORMAL_BITS, SHIFT_BITS = 12, 10
+"""Axial noise takes one of 2^12 equally likely normal quantiles, the lateral jitter of each axis one of 2^10."""
+_PLACE, _FATE, _COLOUR = (np.uint32(n) for n in (0x00000000, 0x6C8E9CF5, 0xD192ED03))
+_ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
+_MOST = np.float32(1e9)
+_TINY = np.float32(1e-30)
+_NEAREST = np.float32(0.01)
+_SHARE = np.float32(2.0**-16)
+_CONSTANT, _SQUARE, _CENTRE = np.float32(0.0012), np.float32(0.0019), np.float32(0.4)
+_RED, _GREEN, _BLUE, _PER_MILLE = np.int32(299), np.int32(587), np.int32(114), np.float32(0.001)
+_FULL = np.float32(255.0)
+_BYTES_MEAN = np.float32(510.0)
+_BYTES_SCALE = np.float32(1.0 / math.sqrt(4.0 * (256.0**2 - 1.0) / 12.0))
+_SPAN = np.float32(8.0)
+
+_jit = njit(cache=True, nogil=True, error_model="numpy")
+_inline = njit(nogil=True, error_model="numpy", forceinline=True)
+
+
+class DepthModel(NamedTuple):
+    """`DepthConfig` in the units of the picture: lengths in px, depths in m."""
+
+    focal: np.float32
+    focal_baseline: np.float32
+    axial: np.float32
+    unit: np.float32
+    nearest: np.float32
+    farthest: np.float32
+    beyond: np.float32
+    ceiling: np.float32
+    jump: np.float32
+    holes: np.float32
+    flying: np.float32
+    shadow: np.float32
+    dark: np.float32
+    dark_level: np.float32
+    grazing: np.float32
+    grazing_cosine: np.float32
+    band: int
+
+
+class DepthWork(NamedTuple):
+    """Buffers: inverse depth (H, W), the chance of no reading (W,) rows of W + 2 pad, and random bits (2, W)."""
+
+    inverse: np.ndarray
+    lost: np.ndarray
+    rows: np.ndarray
+    bits: np.ndarray
+
+
+@_jit
+def corrupt_depth(depth, rgb, frame, model, normal, shift, work, out):
+    """Write what the sensor reports for the true `depth` (H, W) float32 m to `out`; 0 = no reading.
+
+    Args:
+        depth: (H, W) float32, m; not above 0 or not finite = nothing there.
+        rgb: (H, W, 3) uint8, without colour errors.
+        frame: (2,) uint32, the frame's random key.
+        model: `DepthModel`.
+        normal: (2^NORMAL_BITS,) float32 normal quantiles.
+        shift: (2^SHIFT_BITS,) int32, lateral displacements in px.
+        work: `DepthWork`.
+        out: (H, W) float32.
+    """
+    height, width = np.uint64(depth.shape[0]), np.uint64(depth.shape[1])
+    inverse = work.inverse
+    for i in range(height):
+        for j in range(width):
+            z = depth[i, j]
+            inverse[i, j] = _ONE / z if z > _ZERO and z < np.inf else _ZERO
+    _seed(frame, _PLACE, work.bits[0])
+    _seed(frame, _FATE, work.bits[1])
+    for i in range(height):
+        _slopes(i, inverse, model, work.rows[0], work.lost)
+        _darkness(i, rgb, model, work.lost)
+        _shadows(i, inverse, model, work.rows[0], work.lost)
+        _extremes(i, inverse, np.uint64(model.band), work.rows)
+        _read_row(i, depth, model, normal, shift, work, out)
+
+
+@_inline
+def _slopes(i, inverse, model, line, lost):
+    """Set `lost` to the chance that row i is lost to grazing incidence.
+
+    On a plane the inverse depth q is linear in the picture, q = n . r with the ray r = (x, y, 1), so its gradient gives
+    the normal n and the cosine of the incidence q / (|n| |r|). Of the forward and the backward difference the smaller
+    is taken, so that a depth edge is not a slope.
+    """
+    height, width = np.uint64(inverse.shape[0]), np.uint64(inverse.shape[1])
+    one, last = np.uint64(1), height - np.uint64(1)
+    up, down = (i - one if i > 0 else i + one), (i + one if i < last else i - one)
+    if last == 0:
+        up = down = i
+    for j in range(width):
+        line[j + one] = inverse[i, j]
+    before = width - one if width > one else np.uint64(0)
+    line[0] = np.float32(2.0) * inverse[i, 0] - inverse[i, min(one, before)]
+    line[width + one] = np.float32(2.0) * inverse[i, before] - inverse[i, before - one if before > 0 else before]
+    sign_up = _ONE if i > 0 else -_ONE
+    sign_down = _ONE if i < last else -_ONE
+    y = np.float32(i) + _HALF - _HALF * np.float32(height)
+    middle, per_focal = _HALF * np.float32(width) - _HALF, _ONE / model.focal
+    row = _ONE + (y * per_focal) * (y * per_focal)
+    per_cosine = _ONE / model.grazing_cosine
+    for j in range(width):
+        q = inverse[i, j]
+        x = np.float32(np.int32(j)) - middle
+        back, ahead = q - line[j], line[j + np.uint64(2)] - q
+        qu = back if abs(back) < abs(ahead) else ahead
+        back, ahead = sign_up * (q - inverse[up, j]), sign_down * (inverse[down, j] - q)
+        qv = back if abs(back) < abs(ahead) else ahead
+        along = q - x * qu - y * qv
+        squared = (model.focal * qu) * (model.focal * qu) + (model.focal * qv) * (model.focal * qv) + along * along
+        cosine = q / math.sqrt(squared * (row + (x * per_focal) * (x * per_focal)) + _TINY)
+        lost[j] = model.grazing * max(_ONE - cosine * per_cosine, _ZERO)
+
+
+@_inline
+def _darkness(i, rgb, model, lost):
+    """Add the chance that a pixel of row i is lost because it is dark."""
+    per_level = _PER_MILLE / model.dark_level
+    for j in range(np.uint64(rgb.shape[1])):
+        level = _RED * np.int32(rgb[i, j, 0]) + _GREEN * np.int32(rgb[i, j, 1]) + _BLUE * np.int32(rgb[i, j, 2])
+        dark = model.dark * max(_ONE - np.float32(np.int32(level)) * per_level, _ZERO)
+        lost[j] = _ONE - (_ONE - lost[j]) * (_ONE - dark)
+
+
+@_inline
+def _shadows(i, inverse, model, line, lost):
+    """Add the chance that a pixel of row i is lost because something hides it from the projector, right of the camera.
+
+    The projector sees the pixel of column u at u - f b / z; what is seen left of a pixel further right is behind it.
+    """
+    width = np.uint64(inverse.shape[1])
+    for j in range(width):
+        line[j] = np.float32(np.int32(j)) - model.focal_baseline * inverse[i, j]
+    first = np.float32(np.inf)
+    for k in range(width):
+        j = width - np.uint64(1) - k
+        place = line[j]
+        line[j] = model.shadow if place > first else _ZERO
+        first = place if place < first else first
+    for j in range(width):
+        lost[j] = _ONE - (_ONE - lost[j]) * (_ONE - line[j])
+
+
+@_inline
+def _extremes(i, inverse, band, rows):
+    """Write the largest and smallest inverse depth within `band` px of each pixel of row i to rows 1 and 2."""
+    height, width = np.uint64(inverse.shape[0]), np.uint64(inverse.shape[1])
+    top, bottom = (i - band if i > band else np.uint64(0)), min(i + band + np.uint64(1), height)
+    for j in range(width):
+        rows[3, j + band] = inverse[i, j]
+        rows[4, j + band] = inverse[i, j]
+    for k in range(top, bottom):
+        for j in range(width):
+            q = inverse[k, j]
+            rows[3, j + band] = max(rows[3, j + band], q)
+            rows[4, j + band] = min(rows[4, j + band], q)
+    for k in range(band):
+        for n in range(3, 5):
+            rows[n, k] = rows[n, band]
+            rows[n, width + band + k] = rows[n, width + band - np.uint64(1)]
+    for j in range(width):
+        rows[1, j], rows[2, j] = rows[3, j], rows[4, j]
+    for k in range(np.uint64(1), np.uint64(2) * band + np.uint64(1)):
+        for j in range(width):
+            rows[1, j] = max(rows[1, j], rows[3, j + k])
+            rows[2, j] = min(rows[2, j], rows[4, j + k])
+
+
+@_inline
+def _read_row(i, depth, model, normal, shift, work, out):
+    """Read row i: displaced, flying at edges, with axial noise, in steps of disparity, or not at all."""
+    width = np.uint64(depth.shape[1])
+    lost, inverse, high, low = work.lost, work.inverse, work.rows[1], work.rows[2]
+    noise, seen, place, fate = work.rows[3], work.rows[4], work.bits[0], work.bits[1]
+    bottom, right = np.int32(depth.shape[0] - 1), np.int32(depth.shape[1] - 1)
+    row = np.int32(i)
+    steps = np.uint32((1 << SHIFT_BITS) - 1)
+    for j in range(width):
+        place[j] = _advance(place[j])
+        fate[j] = _advance(fate[j])
+    for j in range(width):
+        bits = place[j]
+        v = min(max(row + shift[(bits >> np.uint32(SHIFT_BITS)) & steps], np.int32(0)), bottom)
+        u = min(max(np.int32(j) + shift[bits & steps], np.int32(0)), right)
+        seen[j] = depth[np.uint64(v), np.uint64(u)]
+        noise[j] = normal[bits >> np.uint32(32 - NORMAL_BITS)]
+    if model.band:
+        lively, either = _ONE / max(model.flying, _TINY), model.holes + model.flying
+        for j in range(width):
+            own, z, least, span = inverse[i, j], seen[j], low[j], high[j] - low[j]
+            chance = np.float32(np.int32(fate[j] & np.uint32(0xFFFF))) * _SHARE
+            flown = _ONE / max(least + (chance - model.holes) * lively * span, _TINY)
+            read = flown if chance < either else z
+            read = _ZERO if chance < model.holes else read
+            # far - near > jump max(z, 1), multiplied by the inverse depths
+            seen[j] = read if span * min(own, _ONE) > model.jump * (high[j] * least) else z
+    for j in range(width):
+        true, deviate, threshold = seen[j], noise[j], lost[j]
+        chance = np.float32(np.int32(fate[j] >> np.uint32(16))) * _SHARE
+        spread = true - _CENTRE
+        z = true + model.axial * (_CONSTANT + _SQUARE * (spread * spread)) * deviate
+        disparity = np.int32(min(model.unit / max(z, _NEAREST), _MOST) + _HALF)
+        level = model.unit / max(np.float32(disparity), _ONE)
+        z = level if model.unit > _ZERO else z
+        z = z if true > _ZERO else _ZERO
+        z = z if true < model.beyond else _ZERO
+        z = z if z >= model.nearest else _ZERO
+        z = z if z <= model.farthest else _ZERO
+        z = z if chance >= threshold else _ZERO
+        out[i, j] = min(z, model.ceiling)
+
+
+@_jit
+def corrupt_colour(rgb, frame, gain, read_noise, shot_noise, taps, rows, bits, out):
+    """Write the blurred, exposed and noisy picture to `out`.
+
+    Args:
+        rgb: (H, W, 3) uint8.
+        frame: (2,) uint32, the frame's random key.
+        gain: np.float32, exposure.
+        read_noise: np.float32, grey levels.
+        shot_noise: np.float32, grey levels at level 1.
+        taps: (r + 1,) float32, the blur's weights from the middle outwards.
+        rows: (2, (W + 2 r) 3) float32, buffer.
+        bits: (3 W,) uint32, buffer.
+        out: (H, W, 3) uint8.
+    """
+    height, three, one = np.uint64(rgb.shape[0]), np.uint64(3), np.uint64(1)
+    source, target = rgb.reshape(rgb.shape[0], -1), out.reshape(rgb.shape[0], -1)
+    count, pad = np.uint64(source.shape[1]), np.uint64(3 * (taps.size - 1))
+    line, smooth = rows[0], rows[1]
+    read, shot = read_noise * read_noise, shot_noise * shot_noise
+    _seed(frame, _COLOUR, bits)
+    for i in range(height):
+        for k in range(count):
+            line[pad + k] = gain * taps[0] * np.float32(source[i, k])
+        for t in range(one, np.uint64(taps.size)):
+            above, below, weight = (i - t if i > t else np.uint64(0)), min(i + t, height - one), gain * taps[t]
+            for k in range(count):
+                line[pad + k] += weight * np.float32(np.int32(source[above, k]) + np.int32(source[below, k]))
+        for k in range(pad):
+            line[k] = line[pad + k % three]
+            line[pad + count + k] = line[pad + count - three + k % three]
+        for k in range(count):
+            smooth[k] = taps[0] * line[pad + k]
+        for t in range(one, np.uint64(taps.size)):
+            left, right, weight = pad - three * t, pad + three * t, taps[t]
+            for k in range(count):
+                smooth[k] += weight * (line[left + k] + line[right + k])
+        for k in range(count):
+            state = _advance(bits[k])
+            bits[k] = state
+            level = smooth[k]
+            level += math.sqrt(read + shot * level) * _near_normal(state)
+            target[i, k] = np.uint8(np.int32(min(max(level, _ZERO), _FULL) + _HALF))
+
+
+@_jit
+def pack_bytes(rgb, depth, out):
+    """Write colour and nearness 255 (1 - z / 8 m), 0 = no reading or beyond, to `out` (H, W, 4) uint8."""
+    for i in range(np.uint64(depth.shape[0])):
+        for j in range(np.uint64(depth.shape[1])):
+            z = depth[i, j]
+            near = _FULL * (_ONE - z / _SPAN) if z > _ZERO and z < _SPAN else _ZERO
+            out[i, j, 0], out[i, j, 1], out[i, j, 2] = rgb[i, j, 0], rgb[i, j, 1], rgb[i, j, 2]
+            out[i, j, 3] = np.uint8(np.int32(near))
+
+
+@_inline
+def _seed(frame, stream, states):
+    """Start a generator for each column: the mixing of MurmurHash3, a word of the frame's key before each round."""
+    first, second = frame[0], np.uint32(frame[1] ^ stream)
+    for k in range(np.uint64(states.size)):
+        h = np.uint32(np.uint32(np.uint32(k) * np.uint32(0x9E3779B1)) + first)
+        h = np.uint32((h ^ (h >> np.uint32(16))) * np.uint32(0x21F0AAAD))
+        h = np.uint32((h ^ (h >> np.uint32(15))) ^ second)
+        h = np.uint32((h ^ (h >> np.uint32(16))) * np.uint32(0x85EBCA6B))
+        h = np.uint32((h ^ (h >> np.uint32(13))) * np.uint32(0xC2B2AE35))
+        h = np.uint32(h ^ (h >> np.uint32(16)))
+        states[k] = h if h else np.uint32(1)
+
+
+@_inline
+def _advance(state):
+    """Return the next state of Marsaglia's xorshift32 (2003)."""
+    state = np.uint32(state ^ (state << np.uint32(13)))
+    state = np.uint32(state ^ (state >> np.uint32(17)))
+    return np.uint32(state ^ (state << np.uint32(5)))
+
+
+@_inline
+def _near_normal(bits):
+    """Return a number of mean 0 and variance 1, the sum of the four bytes: near to normal, within 3.5 sigma."""
+    mask = np.uint32(255)
+    total = (bits & mask) + ((bits >> np.uint32(8)) & mask) + ((bits >> np.uint32(16)) & mask) + (bits >> np.uint32(24))
+    return (np.float32(np.int32(total)) - _BYTES_MEAN) * _BYTES_SCALE

@@ -5,6 +5,7 @@ The video shows what the follower believes beside the truth, or, in any size, th
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 
@@ -59,7 +60,7 @@ def watch(
         raise ValueError(f"--size is {size[0]}x{size[1]}; expected even numbers, which MPEG-4 wants")
     picture_size = {"width": camera[0], "height": camera[1]}
     env = FollowEnv(**{**environment_kwargs(cell), "camera": picture_size, "renderer": renderer})
-    view = None if size is None else _make_view(renderer, env.scene, env.camera.config.hfov_deg, size, shadows)
+    view = None if size is None else _make_view(renderer, env.scene, env.camera.config, size, shadows)
     dashboard = Dashboard(
         env.scene,
         env.camera,
@@ -102,14 +103,15 @@ def watch(
     )
 
 
-def _make_view(name: str, scene: Scene, hfov_deg: float, size: tuple[int, int], shadows: bool) -> Renderer:
-    """Return the robot's camera in another size; OpenGL smooths its edges."""
-    camera = PinholeCamera(CameraConfig(width=size[0], height=size[1], hfov_deg=hfov_deg))
-    if name != "opengl":
-        return make_renderer(name, scene, camera)
+def _make_view(name: str, scene: Scene, camera: CameraConfig, size: tuple[int, int], shadows: bool) -> Renderer:
+    """Return the robot's camera in another size, with smooth edges where the renderer can draw them."""
+    supersample = 1 if name == "tiny" else 2
+    larger = PinholeCamera(dataclasses.replace(camera, width=size[0], height=size[1], supersample=supersample))
+    if not shadows:
+        return make_renderer(name, scene, larger)
     from follow_env.camera.opengl import OpenGLRenderer
 
-    return OpenGLRenderer(scene, camera, supersample=2, shadows=shadows)
+    return OpenGLRenderer(scene, larger, shadows=True)
 
 
 class _Writer:

@@ -32,7 +32,7 @@ from follow_env.view import Dashboard, import_pygame, show_window
 OBSERVATIONS = ("measurement", "state", "rgbd", "rgbd_box", "rgbd_uint8")
 ACTIONS = ("twist", "wheels")
 SETTINGS = (
-    *("scene", "obs", "action", "route", "sensor", "camera", "robot", "renderer", "control_hz", "latency_s"),
+    *("scene", "obs", "action", "route", "sensor", "camera", "robot", "renderer", "light", "control_hz", "latency_s"),
     *("person", "outfit", "render_mode"),
 )
 MAX_DISTANCE = 20.0
@@ -80,6 +80,7 @@ class FollowEnv(gymnasium.Env):
         robot: mapping of `RobotConfig` settings.
         renderer: `"raster"` (ours), `"opengl"` (the same picture from a graphics chip; needs the extra `gl`) or
             `"tiny"` (PyBullet's, slow, a cross-check: the person keeps the posture of the episode's first picture).
+        light: `"normal"`, `"dim"` (an evening: 15 % of it) or `"uneven"` (every other lamp all but off).
         control_hz: control and camera rate; divides 240.
         latency_s: age of what is observed, s; a multiple of the control period.
         person: body of the person, one of `follow_env.person.bodies.BODIES`.
@@ -102,6 +103,7 @@ class FollowEnv(gymnasium.Env):
         camera: Mapping[str, Any] | None = None,
         robot: Mapping[str, Any] | None = None,
         renderer: str = "raster",
+        light: str = "normal",
         control_hz: int = 30,
         latency_s: float = 0.0,
         person: str = "man",
@@ -138,7 +140,7 @@ class FollowEnv(gymnasium.Env):
         self.robot_config = build("robot", RobotConfig(), robot)
         self.camera = PinholeCamera(build("camera", CameraConfig(), camera))
         self._sensor = sensor_config(sensor)
-        self.scene = make_scene(scene)
+        self.scene = make_scene(scene, light)
         self._world: World | None = None
         self._renderer: Renderer | None = None
         self._dashboard: Dashboard | None = None

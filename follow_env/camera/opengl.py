@@ -40,20 +40,17 @@ class OpenGLRenderer:
 
     Args:
         scene: the place.
-        camera: the intrinsics.
-        supersample: 1, or 2 for colours averaged over 2 x 2 rays a pixel; depth and ids are those of the pixel centre.
+        camera: the intrinsics; with `supersample` 2 colours are averages, depth and ids those of the pixel centres.
         shadows: whether things stand in the lamps' direct light; the default camera draws no shadows.
 
     Raises:
-        ValueError: if `supersample` is out of range, the scene has values that are not finite, or OpenGL is missing.
+        ValueError: if the scene has values that are not finite, or OpenGL is missing.
     """
 
     _process: ClassVar[int | None] = None
     """The first process that used OpenGL: the driver's threads do not survive a fork; a child would wait forever."""
 
-    def __init__(self, scene: Scene, camera: PinholeCamera, supersample: int = 1, shadows: bool = False) -> None:
-        if supersample not in (1, 2):
-            raise ValueError(f"supersample is {supersample!r}; expected 1 or 2")
+    def __init__(self, scene: Scene, camera: PinholeCamera, shadows: bool = False) -> None:
         self._camera, self._shadows = camera, shadows
         pack = pack_scene(scene)
         self._lamps = pack.lamps if len(pack.lamps) else np.zeros((1, 4), np.float32)
@@ -70,7 +67,9 @@ class OpenGLRenderer:
             self._surface["lamps"].write(self._lamps.tobytes())
             self._caster: Any = context.program(CASTER_VERTEX, CASTER_FRAGMENT) if shadows else None
             self._target = _Target(context, camera.width, camera.height)
-            self._fine = _Target(context, 2 * camera.width, 2 * camera.height) if supersample == 2 else None
+            self._fine = (
+                _Target(context, 2 * camera.width, 2 * camera.height) if camera.config.supersample == 2 else None
+            )
             self._scene = _Drawable(context, self._surface, self._caster, scene_triangles(scene), 0)
             self._people: list[_Drawable] = []
             if shadows:

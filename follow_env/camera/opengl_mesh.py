@@ -9,10 +9,10 @@ import numpy as np
 from follow_env.camera.mesh import Mesh
 from follow_env.camera.raster_scene import FLOOR_THICKNESS
 from follow_env.camera.textures import TEXTURES
-from follow_env.scene import Box, Cylinder, Material, Scene
+from follow_env.scene import Box, Capsule, Cylinder, Material, Scene, Sphere
 
-SIDES = 48
-"""Sides of the prism that stands for a cylinder: it lies within 0.22 % of the radius."""
+SIDES, ROWS = 48, 12
+"""Sides of the prism that stands for a cylinder, which lies within 0.22 % of the radius; rows of a half sphere."""
 
 
 class Triangles(NamedTuple):
@@ -83,7 +83,31 @@ def _cylinder(cylinder: Cylinder) -> Iterable[_Patch]:
         yield _turned(cylinder.centre, [(0.0, up * half, 0.0, up), (radius, up * half, 0.0, up)], curved=False)
 
 
-_PATCHES: dict[type, Callable[..., Iterable[_Patch]]] = {Box: _box, Cylinder: _cylinder}
+def _sphere(sphere: Sphere) -> Iterable[_Patch]:
+    yield _turned(sphere.centre, [*_quarter(sphere.radius, -1), *_quarter(sphere.radius, 1)[1:]], curved=True)
+
+
+def _capsule(capsule: Capsule) -> Iterable[_Patch]:
+    """Yield the straight part and the two half spheres."""
+    (x, y, z), radius, half = capsule.centre, capsule.radius, 0.5 * capsule.straight
+    yield _turned(capsule.centre, [(radius, -half, 1.0, 0.0), (radius, half, 1.0, 0.0)], curved=True)
+    for up in (-1, 1):
+        yield _turned((x, y, z + up * half), _quarter(radius, up), curved=True)
+
+
+_PATCHES: dict[type, Callable[..., Iterable[_Patch]]] = {
+    Box: _box,
+    Cylinder: _cylinder,
+    Sphere: _sphere,
+    Capsule: _capsule,
+}
+
+
+def _quarter(radius: float, up: int) -> list[tuple[float, float, float, float]]:
+    """Return the profile of a half sphere, upwards: the lower (-1) or the upper (1) one."""
+    first = ROWS if up > 0 else 0
+    turns = [0.5 * math.pi * (first + k - ROWS) / ROWS for k in range(ROWS + 1)]
+    return [(radius * math.cos(a), radius * math.sin(a), math.cos(a), math.sin(a)) for a in turns]
 
 
 def _turned(

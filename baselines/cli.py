@@ -60,7 +60,9 @@ def _watch(parsed: argparse.Namespace) -> int:
     from baselines.watch import watch
 
     try:
-        print(watch(Cell(parsed.perception, parsed.scene, parsed.estimator), parsed.seed, parsed.video))
+        cell = Cell(parsed.perception, parsed.scene, parsed.estimator)
+        renderer, size, shadows = parsed.renderer, parsed.size, parsed.shadows
+        print(watch(cell, parsed.seed, parsed.video, renderer=renderer, size=size, shadows=shadows))
     except ValueError as error:
         print(f"follow: {error}", file=sys.stderr)
         return BAD_INPUT
@@ -149,6 +151,11 @@ def _add_watch(commands: _Commands) -> None:
     watch.add_argument(
         "--video", type=_output_file, default=Path("watch.mp4"), metavar="FILE", help="default: %(default)s"
     )
+    watch.add_argument(
+        "--renderer", default="raster", metavar="NAME", help="raster, opengl or tiny (default: %(default)s)"
+    )
+    watch.add_argument("--size", type=_size, metavar="WIDTHxHEIGHT", help="show the robot's view alone, in this size")
+    watch.add_argument("--shadows", action="store_true", help="with --size and --renderer opengl: lamps cast shadows")
     watch.set_defaults(run=_watch)
 
 
@@ -195,6 +202,14 @@ def _whole(text: str, least: int) -> int:
     if value < least:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least {least}")
     return value
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    try:
+        return _natural(width), _natural(height)
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no size; expected WIDTHxHEIGHT, such as 1280x720") from None
 
 
 def _output_file(text: str) -> Path:

@@ -1,7 +1,11 @@
-"""`follow watch`: an episode as a video and a contact sheet, with what the follower believes drawn beside the truth."""
+"""`follow watch`: an episode as a video and a contact sheet.
+
+The video shows what the follower believes beside the truth, or, in any size, the robot's view alone.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 
@@ -10,16 +14,27 @@ import numpy as np
 
 from baselines.benchmark.assembly import environment_kwargs, follower
 from baselines.benchmark.cells import Cell
+from follow_env.camera import PinholeCamera, Renderer, make_renderer
+from follow_env.config import CameraConfig
 from follow_env.env import FollowEnv
+from follow_env.scene import Scene
 from follow_env.view import Dashboard
 
 CAMERA = (320, 240)
-SHEET_PICTURES = 4
+SHEET_PICTURES, SHEET_WIDTH = 4, 720
 CODEC = "mp4v"
 """MPEG-4 part 2: the one MP4 codec that every OpenCV wheel can write quickly."""
 
 
-def watch(cell: Cell, seed: int, video: Path, camera: tuple[int, int] = CAMERA) -> str:
+def watch(
+    cell: Cell,
+    seed: int,
+    video: Path,
+    camera: tuple[int, int] = CAMERA,
+    renderer: str = "raster",
+    size: tuple[int, int] | None = None,
+    shadows: bool = False,
+) -> str:
     """Play an episode, write a video and a contact sheet, and return a summary.
 
     Args:
@@ -27,52 +42,76 @@ def watch(cell: Cell, seed: int, video: Path, camera: tuple[int, int] = CAMERA) 
         seed: of the episode.
         video: the MP4 file; the sheet is the PNG of the same name.
         camera: width and height of the robot's picture, px.
+        renderer: who draws the pictures.
+        size: width and height of a video of the robot's view alone, px; None = the dashboard. The episode is the same.
+        shadows: whether the lamps cast shadows in that view; only with the renderer `"opengl"`.
 
     Raises:
-        ValueError: if the video cannot be written.
+        ValueError: if the video cannot be written, or the renderer cannot draw it.
     """
     if video.suffix != ".mp4":
         raise ValueError(f"--video is {str(video)!r}; expected a name that ends in .mp4")
     sheet = video.with_suffix(".png")
     if not video.parent.is_dir():
         raise ValueError(f"the folder {video.parent} of --video does not exist; make it first or name another")
-    size = {"width": camera[0], "height": camera[1]}
-    env = FollowEnv(**{**environment_kwargs(cell), "camera": size})
+    if shadows and (renderer != "opengl" or size is None):
+        raise ValueError("--shadows needs --renderer opengl and --size, for example --size 1280x720")
+    if size is not None and any(side % 2 for side in size):
+        raise ValueError(f"--size is {size[0]}x{size[1]}; expected even numbers, which MPEG-4 wants")
+    picture_size = {"width": camera[0], "height": camera[1]}
+    env = FollowEnv(**{**environment_kwargs(cell), "camera": picture_size, "renderer": renderer})
+    view = None if size is None else _make_view(renderer, env.scene, env.camera.config, size, shadows)
     dashboard = Dashboard(
         env.scene,
         env.camera,
         env.robot_config.camera_forward,
         f"{cell.scene}, {cell.perception}, {cell.estimator} + PI",
     )
-    policy, state = follower(cell, size), None
+    policy, state = follower(cell, picture_size), None
     observation, info = env.reset(seed=seed)
-    pictures: list[np.ndarray] = []
+    small: list[np.ndarray] = []
     writer = _Writer(video, round(1.0 / env.dt))
     try:
         ended = False
         while True:
             action, state = policy.predict(observation, state)
-            seen = env.observed or env.frame()
-            box = tuple(observation["box"].tolist()) if cell.perception == "mask" else seen.person_box()
-            estimate = None if state.estimate is None else (state.estimate.bearing, state.estimate.distance)
-            dashboard.update(info, seen, box, estimate)
-            pictures.append(dashboard.image())
-            writer.write(pictures[-1])
+            if view is None:
+                seen = env.observed or env.frame()
+                box = tuple(observation["box"].tolist()) if cell.perception == "mask" else seen.person_box()
+                estimate = None if state.estimate is None else (state.estimate.bearing, state.estimate.distance)
+                dashboard.update(info, seen, box, estimate)
+                picture = dashboard.image()
+            else:
+                picture = view.render(env.camera_pose(), env.people()).rgb
+            writer.write(picture)
+            small.append(_shrunk(picture))
             if ended:
                 break
             observation, _, terminated, truncated, info = env.step(action)
             ended = terminated or truncated
     finally:
-        writer.close()
-        env.close()
-    if not cv2.imwrite(str(sheet), _contact_sheet(pictures)[:, :, ::-1]):
+        for part in (writer, env, view):
+            if part is not None:
+                part.close()
+    if not cv2.imwrite(str(sheet), _contact_sheet(small)[:, :, ::-1]):
         raise ValueError(f"the contact sheet {sheet} cannot be written; check the folder's permissions")
     reason = "collision" if info["collision"] else "person lost" if terminated else "the route's end"
     success = "yes" if info["is_success"] else "no"
     return (
-        f"{len(pictures)} frames, {info['time']:.1f} s, ended by {reason}, success {success}\n"
+        f"{len(small)} frames, {info['time']:.1f} s, ended by {reason}, success {success}\n"
         f"{video} ({video.stat().st_size / 1e6:.1f} MB) and {sheet}"
     )
+
+
+def _make_view(name: str, scene: Scene, camera: CameraConfig, size: tuple[int, int], shadows: bool) -> Renderer:
+    """Return the robot's camera in another size, with smooth edges where the renderer can draw them."""
+    supersample = 1 if name == "tiny" else 2
+    larger = PinholeCamera(dataclasses.replace(camera, width=size[0], height=size[1], supersample=supersample))
+    if not shadows:
+        return make_renderer(name, scene, larger)
+    from follow_env.camera.opengl import OpenGLRenderer
+
+    return OpenGLRenderer(scene, larger, shadows=True)
 
 
 class _Writer:
@@ -100,9 +139,13 @@ class _Writer:
         raise ValueError(f"the video {self._path} cannot be written; check the folder's permissions")
 
 
+def _shrunk(picture: np.ndarray) -> np.ndarray:
+    height = round(SHEET_WIDTH * picture.shape[0] / picture.shape[1])
+    return cv2.resize(picture, (SHEET_WIDTH, height), interpolation=cv2.INTER_AREA)
+
+
 def _contact_sheet(pictures: list[np.ndarray]) -> np.ndarray:
-    """Return evenly spaced pictures at half size, two columns."""
+    """Return evenly spaced pictures in two columns."""
     chosen = [pictures[round(i * (len(pictures) - 1) / (SHEET_PICTURES - 1))] for i in range(SHEET_PICTURES)]
-    half = [cv2.resize(p, None, fx=0.75, fy=0.75, interpolation=cv2.INTER_AREA) for p in chosen]
-    rows = math.ceil(len(half) / 2)
-    return np.vstack([np.hstack(half[2 * r : 2 * r + 2]) for r in range(rows)])
+    rows = math.ceil(len(chosen) / 2)
+    return np.vstack([np.hstack(chosen[2 * r : 2 * r + 2]) for r in range(rows)])

@@ -82,6 +82,7 @@ class CameraConfig:
         width, height: picture size, px.
         hfov_deg: horizontal field of view, degrees (paper B: 57.5).
         near, far: clipping distances of the renderer, m.
+        supersample: 1, or 2 for colours averaged over 2 x 2 rays a pixel; depth and ids are those of a pixel's centre.
     """
 
     width: int = 320
@@ -89,6 +90,7 @@ class CameraConfig:
     hfov_deg: float = 57.5
     near: float = 0.1
     far: float = 30.0
+    supersample: int = 1
 
     def __post_init__(self) -> None:
         for name in ("width", "height"):
@@ -101,6 +103,8 @@ class CameraConfig:
             raise ValueError(
                 f"camera near, far are {self.near!r}, {self.far!r}; expected 0 < near < far in metres, finite"
             )
+        if self.supersample not in (1, 2):
+            raise ValueError(f"camera supersample is {self.supersample!r}; expected 1 or 2")
 
 
 @dataclasses.dataclass(frozen=True)

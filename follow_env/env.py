@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 
 from follow_env.camera import RENDERERS, CameraPose, PinholeCamera, Renderer, RGBDFrame, make_renderer
+from follow_env.camera.mesh import Placed
 from follow_env.config import CameraConfig, RobotConfig, SensorConfig, build, choose, sensor_config
 from follow_env.measurement import GaussMarkov, MeasurementModel
 from follow_env.person.bodies import BODIES, OUTFITS, load_body
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 OBSERVATIONS = ("measurement", "state", "rgbd", "rgbd_box", "rgbd_uint8")
 ACTIONS = ("twist", "wheels")
 SETTINGS = (
-    *("scene", "obs", "action", "route", "sensor", "camera", "robot", "renderer", "control_hz", "latency_s"),
+    *("scene", "obs", "action", "route", "sensor", "camera", "robot", "renderer", "light", "control_hz", "latency_s"),
     *("person", "outfit", "render_mode"),
 )
 MAX_DISTANCE = 20.0
@@ -81,8 +82,9 @@ class FollowEnv(gymnasium.Env):
             of `"xtion"`, or of its entry `preset`: `{"preset": "ideal", "measurement": {"miss_share": 0.1}}`.
         camera: mapping of `CameraConfig` settings, e.g. `{"width": 320, "height": 240}`.
         robot: mapping of `RobotConfig` settings.
-        renderer: `"raster"` (ours) or `"tiny"` (PyBullet's, slow, a cross-check: the person keeps the posture of
-            the episode's first picture).
+        renderer: `"raster"` (ours), `"opengl"` (the same picture from a graphics chip; needs the extra `gl`) or
+            `"tiny"` (PyBullet's, slow, a cross-check: the person keeps the posture of the episode's first picture).
+        light: `"normal"`, `"dim"` (an evening: 15 % of it) or `"uneven"` (every other lamp all but off).
         control_hz: control and camera rate; divides 240.
         latency_s: age of what is observed, s; a multiple of the control period.
         person: body of the person, one of `follow_env.person.bodies.BODIES`.
@@ -105,6 +107,7 @@ class FollowEnv(gymnasium.Env):
         camera: Mapping[str, Any] | None = None,
         robot: Mapping[str, Any] | None = None,
         renderer: str = "raster",
+        light: str = "normal",
         control_hz: int = 30,
         latency_s: float = 0.0,
         person: str = "man",
@@ -141,7 +144,7 @@ class FollowEnv(gymnasium.Env):
         self.robot_config = build("robot", RobotConfig(), robot)
         self.camera = PinholeCamera(build("camera", CameraConfig(), camera))
         self._sensor = self._sensor_in_use = sensor_config(sensor)
-        self.scene = make_scene(scene)
+        self.scene = make_scene(scene, light)
         self._world: World | None = None
         self._renderer: Renderer | None = None
         self._dashboard: Dashboard | None = None
@@ -255,11 +258,16 @@ class FollowEnv(gymnasium.Env):
         assert self._world is not None
         if self._renderer is None:
             self._renderer = make_renderer(self._renderer_name, self.scene, self.camera)
+        return self._renderer.render(self.camera_pose(), self.people())
+
+    def people(self) -> tuple[Placed, ...]:
+        """Return the people as they stand at this moment, for another camera to draw."""
+        if self._route is None:
+            raise gymnasium.error.ResetNeeded("people() was called before reset(); call reset() first")
         if self._walker is None:
             self._walker = Walker(load_body(*self._dressed))
         t = self.time
-        person = self._walker.place(*self._route.pose(t), self._route.walked(t), self._route.speed(t))
-        return self._renderer.render(self.camera_pose(), (person,))
+        return (self._walker.place(*self._route.pose(t), self._route.walked(t), self._route.speed(t)),)
 
     def camera_pose(self) -> CameraPose:
         """Pose of the camera in the world frame."""

@@ -11,7 +11,7 @@ import pybullet
 
 from follow_env.config import RobotConfig
 from follow_env.robot import DiffDrive
-from follow_env.scene import Box, Cylinder, Scene
+from follow_env.scene import Box, Capsule, Cylinder, Primitive, Scene, Sphere
 
 PHYSICS_HZ = 240
 SOLVER_ITERATIONS = 10
@@ -22,6 +22,13 @@ CONTACT_BREAKING = 0.0005
 WHEEL_JOINTS = (0, 1)
 ROTOR_INERTIA = 0.02
 """Wheel with its geared motor's reflected inertia about the axle, kg m^2."""
+SHAPES = {
+    Box: pybullet.GEOM_BOX,
+    Cylinder: pybullet.GEOM_CYLINDER,
+    Sphere: pybullet.GEOM_SPHERE,
+    Capsule: pybullet.GEOM_CAPSULE,
+}
+"""PyBullet's shape of each primitive, in the order in which a compound body holds them."""
 COMPOUND_LIMIT = 16
 """Most shapes PyBullet takes in one compound body."""
 
@@ -178,20 +185,20 @@ class World:
         for _ in range(PHYSICS_HZ):
             pybullet.stepSimulation(self._client)
 
-    def _add_static(self, primitives: tuple[Box | Cylinder, ...]) -> None:
+    def _add_static(self, primitives: tuple[Primitive, ...]) -> None:
         """Add fixed primitives as one compound body: fewer bodies to visit in each physics step."""
-        client = self._client
-        boxes = [p for p in primitives if isinstance(p, Box)]
-        cylinders = [p for p in primitives if isinstance(p, Cylinder)]
-        placed: list[Box | Cylinder] = [*boxes, *cylinders]
+        client, kinds = self._client, list(SHAPES)
+        placed = sorted(primitives, key=lambda p: kinds.index(type(p)))
+        yaws = [p.yaw if isinstance(p, Box) else 0.0 for p in placed]
         shape = pybullet.createCollisionShapeArray(
-            shapeTypes=[pybullet.GEOM_BOX] * len(boxes) + [pybullet.GEOM_CYLINDER] * len(cylinders),
-            halfExtents=[[0.5 * s for s in box.size] for box in boxes] + [[0.0] * 3] * len(cylinders),
-            radii=[0.0] * len(boxes) + [c.radius for c in cylinders],
-            lengths=[0.0] * len(boxes) + [c.height for c in cylinders],
+            shapeTypes=[SHAPES[type(p)] for p in placed],
+            halfExtents=[[0.5 * s for s in p.size] if isinstance(p, Box) else [0.0] * 3 for p in placed],
+            radii=[0.0 if isinstance(p, Box) else p.radius for p in placed],
+            lengths=[
+                p.height if isinstance(p, Cylinder) else p.straight if isinstance(p, Capsule) else 0.0 for p in placed
+            ],
             collisionFramePositions=[p.centre for p in placed],
-            collisionFrameOrientations=[(0.0, 0.0, math.sin(0.5 * b.yaw), math.cos(0.5 * b.yaw)) for b in boxes]
-            + [(0.0, 0.0, 0.0, 1.0)] * len(cylinders),
+            collisionFrameOrientations=[(0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw)) for yaw in yaws],
             physicsClientId=client,
         )
         pybullet.createMultiBody(0, shape, physicsClientId=client)

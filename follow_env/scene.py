@@ -6,6 +6,7 @@ World frame: x along the scene's main direction, y left, z up, floor at z = 0, m
 import functools
 import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -32,6 +33,14 @@ class Box:
     yaw: float = 0.0
     solid: bool = True
 
+    def __post_init__(self) -> None:
+        _check(self, (*self.centre, self.yaw), self.size)
+
+    @property
+    def bottom(self) -> float:
+        """Height of the lowest point, m."""
+        return self.centre[2] - 0.5 * self.size[2]
+
 
 @dataclass(frozen=True)
 class Cylinder:
@@ -42,6 +51,64 @@ class Cylinder:
     height: float
     material: Material
     solid: bool = True
+
+    def __post_init__(self) -> None:
+        _check(self, self.centre, (self.radius, self.height))
+
+    @property
+    def bottom(self) -> float:
+        """Height of the lowest point, m."""
+        return self.centre[2] - 0.5 * self.height
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A sphere: centre (m), radius (m)."""
+
+    centre: tuple[float, float, float]
+    radius: float
+    material: Material
+    solid: bool = True
+
+    def __post_init__(self) -> None:
+        _check(self, self.centre, (self.radius,))
+
+    @property
+    def bottom(self) -> float:
+        """Height of the lowest point, m."""
+        return self.centre[2] - self.radius
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """An upright capsule: centre (m), radius (m), height from tip to tip (m), greater than the diameter."""
+
+    centre: tuple[float, float, float]
+    radius: float
+    height: float
+    material: Material
+    solid: bool = True
+
+    def __post_init__(self) -> None:
+        _check(self, self.centre, (self.radius, self.height))
+        if self.height <= 2.0 * self.radius:
+            raise ValueError(
+                f"a capsule of radius {self.radius!r} m has the height {self.height!r} m; expected more than the "
+                "diameter, or use a Sphere"
+            )
+
+    @property
+    def bottom(self) -> float:
+        """Height of the lowest point, m."""
+        return self.centre[2] - 0.5 * self.height
+
+    @property
+    def straight(self) -> float:
+        """Height of the part between the two half spheres, m."""
+        return self.height - 2.0 * self.radius
+
+
+Primitive: TypeAlias = Box | Cylinder | Sphere | Capsule
 
 
 @dataclass(frozen=True)
@@ -58,7 +125,7 @@ class Scene:
 
     Attributes:
         name: scene name.
-        primitives: boxes and cylinders.
+        primitives: what stands on the floor, and walls and ceiling.
         floor: the floor's material.
         lights: lamps.
         ambient: ambient light in [0, 1].
@@ -68,7 +135,7 @@ class Scene:
     """
 
     name: str
-    primitives: tuple[Box | Cylinder, ...]
+    primitives: tuple[Primitive, ...]
     floor: Material
     lights: tuple[Light, ...]
     ambient: float
@@ -76,22 +143,21 @@ class Scene:
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     start_width: float = 0.3
 
-    def obstacles(self) -> tuple[Box | Cylinder, ...]:
-        """Solid primitives that a person or the robot could run into (those whose lower edge is below 2 m)."""
-        return tuple(
-            p
-            for p in self.primitives
-            if p.solid and p.centre[2] - 0.5 * (p.size[2] if isinstance(p, Box) else p.height) < 2.0
-        )
+    def obstacles(self) -> tuple[Primitive, ...]:
+        """Solid primitives that a person or the robot could run into (those whose lowest point is below 2 m)."""
+        return tuple(p for p in self.primitives if p.solid and p.bottom < 2.0)
 
     def clearance(self, points: np.ndarray) -> float:
-        """Least horizontal distance between any of the points (n, 2) and any obstacle, m; 0 inside one."""
+        """Least horizontal distance between any of the points (n, 2) and any obstacle, m; 0 inside one.
+
+        Round obstacles count with their full radius; without obstacles the clearance is infinite.
+        """
         centres, halves, axes, radii = self._footprints
         offset = points[:, None, :] - centres
         along = np.abs(offset[..., 0] * axes[:, 0] + offset[..., 1] * axes[:, 1])
         across = np.abs(offset[..., 1] * axes[:, 0] - offset[..., 0] * axes[:, 1])
         gap_x, gap_y = np.maximum(along - halves[:, 0], 0.0), np.maximum(across - halves[:, 1], 0.0)
-        return float(np.maximum(np.sqrt(gap_x * gap_x + gap_y * gap_y) - radii, 0.0).min())
+        return float(np.maximum(np.sqrt(gap_x * gap_x + gap_y * gap_y) - radii, 0.0).min(initial=math.inf))
 
     @functools.cached_property
     def _footprints(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -102,7 +168,7 @@ class Scene:
             else (*p.centre[:2], 0.0, 0.0, 1.0, 0.0, p.radius)
             for p in self.obstacles()
         }
-        table = np.array(sorted(rows))
+        table = np.array(sorted(rows)).reshape(-1, 7)
         return table[:, :2], table[:, 2:4], table[:, 4:6], table[:, 6]
 
     def illumination(self, x: float, y: float) -> float:
@@ -112,3 +178,8 @@ class Scene:
             dx, dy, dz = light.position[0] - x, light.position[1] - y, light.position[2] - 1.0
             total += light.intensity * dz * dz / (dx * dx + dy * dy + dz * dz)
         return total
+
+
+def _check(primitive: Primitive, place: tuple[float, ...], lengths: tuple[float, ...]) -> None:
+    if not (all(map(math.isfinite, (*place, *lengths))) and min(lengths) > 0.0):
+        raise ValueError(f"{primitive!r} cannot be; expected finite metres and radians, and sizes > 0")

@@ -11,7 +11,7 @@ from follow_env.scene import Scene
 
 __all__ = ["RENDERERS", "CameraPose", "PinholeCamera", "RGBDFrame", "Renderer", "make_renderer"]
 
-RENDERERS = ("raster", "tiny")
+RENDERERS = ("raster", "tiny", "opengl")
 
 
 class Renderer(Protocol):
@@ -25,11 +25,16 @@ class Renderer(Protocol):
 
 
 def make_renderer(name: str, scene: Scene, camera: PinholeCamera) -> Renderer:
-    """Return the renderer `name`; a ValueError names the nearest when there is none."""
-    if choose("renderer", name, RENDERERS) == "tiny":
+    """Return the renderer `name`; a ValueError names the nearest when there is none, or what this machine lacks."""
+    choose("renderer", name, RENDERERS)
+    if name == "tiny":
         from follow_env.camera.tiny import TinyRenderer
 
         return TinyRenderer(scene, camera)
+    if name == "opengl":
+        from follow_env.camera.opengl import OpenGLRenderer
+
+        return OpenGLRenderer(scene, camera)
     from follow_env.camera.raster import RasterRenderer
 
     return RasterRenderer(scene, camera)

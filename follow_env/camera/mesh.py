@@ -1,11 +1,14 @@
 """`Mesh` and `Placed`: what a renderer needs to know of a person's surface."""
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
 
 PLAIN, STRIPES, CHECKS = 0, 1, 2
 """Patterns of a face: `Mesh.pattern`."""
+BORDER_RINGS = 2
+"""Rings of triangles along an open border that are drawn from both sides; deeper insides are all but never seen."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,17 @@ class Mesh:
             )
         if faces and self.pattern.max() > CHECKS:
             raise ValueError(f"mesh pattern is {self.pattern.max()}; expected 0 (plain), 1 (stripes) or 2 (checks)")
+
+    @functools.cached_property
+    def near_border(self) -> np.ndarray:
+        """(F,) bool: triangles so near an open border (cuff, hem, collar) that their inside can be seen through it."""
+        edges = np.sort(self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        edges, uses = np.unique(edges, axis=0, return_counts=True)
+        near, reached = np.zeros(len(self.faces), np.bool_), edges[uses == 1].reshape(-1)
+        for _ in range(BORDER_RINGS):
+            near |= np.isin(self.faces, reached).any(axis=1)
+            reached = self.faces[near].reshape(-1)
+        return near
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
-"""`RasterRenderer`: the default camera. Boxes, cylinders and people in one z-buffer, compiled by numba.
+"""`RasterRenderer`: the default camera. Solids and people in one z-buffer, compiled by numba.
 
-Flat faces are half-planes and a linear 1/Z over the picture, cylinders are solved per column, people are triangles. The
-nearest at a pixel centre wins, and each visible pixel is shaded once. The rooms: `raster_scene` packs the scene,
-`raster_setup` and `raster_people` find what may be seen, `raster_fill` draws tiles, `raster_shade` colours them.
+Flat faces are half-planes and a linear 1/Z over the picture, cylinders are solved per column, balls (spheres and the
+ends of capsules) per pixel, people are triangles. The nearest at a pixel centre wins, and each visible pixel is shaded
+once. The rooms: `raster_scene` packs the scene, `raster_setup` and `raster_people` find what may be seen, `raster_fill`
+draws tiles, `raster_shade` colours them.
 """
 
 import math
@@ -30,25 +31,22 @@ class RasterRenderer:
 
     Args:
         scene: the place.
-        camera: the intrinsics.
-        supersample: 1, or 2 for colours averaged over 2 x 2 rays a pixel; depth and ids are those of the pixel centre.
+        camera: the intrinsics; with `supersample` 2 colours are averages, depth and ids those of the pixel centres.
         threads: threads that share a picture (or the cameras of a batch).
 
     Raises:
-        ValueError: if `supersample` or `threads` is out of range, or the scene has values that are not finite.
+        ValueError: if `threads` is out of range, or the scene has values that are not finite.
     """
 
-    def __init__(self, scene: Scene, camera: PinholeCamera, supersample: int = 1, threads: int = 1) -> None:
-        if supersample not in (1, 2):
-            raise ValueError(f"supersample is {supersample!r}; expected 1 or 2")
+    def __init__(self, scene: Scene, camera: PinholeCamera, threads: int = 1) -> None:
         if not isinstance(threads, int) or threads < 1:
             raise ValueError(f"threads is {threads!r}; expected a whole number from 1")
-        self._camera, self._supersample, self._threads = camera, supersample, threads
+        self._camera, self._supersample, self._threads = camera, camera.config.supersample, threads
         self._scene = pack_scene(scene)
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self._meshes: list[tuple[Mesh, int]] = []
         self._people, self._workspaces = self._pack_people(())
-        shape = (camera.height * 2, camera.width * 2) if supersample == 2 else (0, 0)
+        shape = (camera.height * 2, camera.width * 2) if self._supersample == 2 else (0, 0)
         self._fine = RGBDFrame(np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32), np.empty(shape, np.uint8))
         self._warm = False
 
@@ -149,6 +147,7 @@ class RasterRenderer:
             ),
             np.concatenate([none, *(m.colours for m in meshes)]),
             np.concatenate([np.zeros(0, np.uint8), *(m.pattern for m in meshes)]),
+            np.concatenate([np.zeros(0, np.bool_), *(m.near_border for m in meshes)]),
             np.concatenate([none, *(m.anchors for m in meshes)]),
             np.repeat(np.array([p.id for p in people], np.uint8), sizes[1:, 1]),
             starts,

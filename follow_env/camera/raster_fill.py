@@ -140,3 +140,22 @@ def fill_cylinder(rounds, n, number, lanes, seen, near):
                 nearer = (value > lanes[DEPTH + k]) & (aside * aside <= room)
                 lanes[DEPTH + k] = value if nearer else lanes[DEPTH + k]
                 seen[k] = other if nearer else seen[k]
+
+
+@_jit
+def fill_ball(balls, n, number, lanes, seen, near):
+    """Draw ball `n`: of the two points where a ray meets it, the first that counts (beyond `near`, within the part)."""
+    x, y, z, gap = balls[n, 0], balls[n, 1], balls[n, 2], balls[n, 3]
+    low, high = balls[n, 4], balls[n, 5]
+    for k in range(PIXELS):
+        across, down = np.float64(lanes[X + k]), np.float64(lanes[Y + k])
+        a, b = (across * across + down * down) + 1.0, (across * x + down * y) + z
+        inner = b * b - a * gap
+        root = math.sqrt(max(inner, 0.0))
+        first, second = (b - root) / a, (b + root) / a
+        one = (first >= near) & (down * first >= low) & (down * first <= high)
+        two = (second >= near) & (down * second >= low) & (down * second <= high)
+        value = np.float32(1.0 / (first if one else second))
+        nearer = (inner > 0.0) & (one | two) & (value > lanes[DEPTH + k])
+        lanes[DEPTH + k] = value if nearer else lanes[DEPTH + k]
+        seen[k] = number if nearer else seen[k]

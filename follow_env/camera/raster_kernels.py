@@ -12,10 +12,20 @@ import numpy as np
 from numba import njit
 from numba.core import event
 
-from follow_env.camera.raster_fill import DEPTH, DISTANCE, PIXELS, TILE, clear, fill_cylinder, fill_facet, fill_triangle
+from follow_env.camera.raster_fill import (
+    DEPTH,
+    DISTANCE,
+    PIXELS,
+    TILE,
+    clear,
+    fill_ball,
+    fill_cylinder,
+    fill_facet,
+    fill_triangle,
+)
 from follow_env.camera.raster_people import find_triangles
 from follow_env.camera.raster_scene import CYLINDER_PARTS, FACES
-from follow_env.camera.raster_setup import find_cylinders, find_facets
+from follow_env.camera.raster_setup import find_balls, find_cylinders, find_facets
 from follow_env.camera.raster_shade import BACKGROUND, shade_surface, shade_triangle
 
 
@@ -51,6 +61,7 @@ def _compiled(sources: int) -> Callable[..., int]:
         key = sources  # noqa: F841  captured, hence part of the cache key
         facets = find_facets(view, scene.boxes, work)
         rounds = find_cylinders(view, scene.cylinders, work)
+        balls = find_balls(view, scene.balls, work)
         triangles = find_triangles(view, people, scene, work)
         if triangles < 0:
             return -1
@@ -65,7 +76,7 @@ def _compiled(sources: int) -> Callable[..., int]:
             for column in range(view.columns):
                 n = row * view.columns + column
                 inside = entries[starts[n] : starts[n + 1]]
-                _fill_tile(row, column, view, scene, work, count, rounds, inside)
+                _fill_tile(row, column, view, scene, work, count, rounds, balls, inside)
                 _write_tile(row, column, view, scene, people, work, inside.size, coloured, rgb, depth, ids)
         return 0
 
@@ -98,8 +109,8 @@ def _sort_into_tiles(triangles, view, places):
 
 
 @_inline
-def _fill_tile(row, column, view, scene, work, count, rounds, inside):
-    """Find what a tile sees among the first `count` facets of `work.row`, the cylinders and the triangles `inside`."""
+def _fill_tile(row, column, view, scene, work, count, rounds, balls, inside):
+    """Find what a tile sees of the first `count` facets of `work.row`, cylinders, balls, the triangles `inside`."""
     lanes, seen = work.lanes, work.seen
     background, limit = np.float32(1.0 / view.far), np.float32(1.0 / view.near)
     left, top = view.left + column * TILE * view.step, view.top + row * TILE * view.step
@@ -116,6 +127,12 @@ def _fill_tile(row, column, view, scene, work, count, rounds, inside):
         met = places[k, 1] <= column <= places[k, 2] and places[k, 3] <= row <= places[k, 4]
         if met and cylinders[k, 5] > floor:
             fill_cylinder(cylinders, k, np.int32(first + CYLINDER_PARTS * places[k, 0]), lanes, seen, view.near)
+    first += CYLINDER_PARTS * scene.cylinders.shape[0]
+    records, places = work.balls, work.ball_places
+    for k in range(balls):
+        met = places[k, 1] <= column <= places[k, 2] and places[k, 3] <= row <= places[k, 4]
+        if met and records[k, 6] > floor:
+            fill_ball(records, k, np.int32(first + places[k, 0]), lanes, seen, view.near)
     first = scene.surfaces.shape[0]
     triangles, places = work.triangles, work.triangle_places
     for t in inside:

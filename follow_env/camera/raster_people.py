@@ -22,8 +22,10 @@ def find_triangles(view, people, scene, work):
     is interpolated over the triangle in perspective.
     """
     near = view.near
-    vertices, faces, anchors, pattern = people.vertices, people.faces, people.anchors, people.pattern
-    points, light, records, place = work.camera_points, work.vertex_light, work.triangles, work.triangle_places
+    vertices, faces, anchors = people.vertices, people.faces, people.anchors
+    pattern, borders = people.pattern, people.borders
+    points, records, place = work.camera_points, work.triangles, work.triangle_places
+    front, back = work.front_light, work.back_light
     corners, bounds = work.quad, work.bounds
     count = 0
     for person in range(people.starts.shape[0] - 1):
@@ -33,14 +35,14 @@ def find_triangles(view, people, scene, work):
             return -1
         if ahead == 0:
             continue
-        _light_vertices(vertices, people.normals, first, last, scene.lamps, scene.ambient, light)
+        _light_vertices(vertices, people.normals, first, last, scene.lamps, scene.ambient, front, back)
         for f in range(people.starts[person, 1], people.starts[person + 1, 1]):
             i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
             ax, ay, az = points[i, 0], points[i, 1], points[i, 2]
             bx, by, bz = points[j, 0], points[j, 1], points[j, 2]
             cx, cy, cz = points[k, 0], points[k, 1], points[k, 2]
             volume = (ax * (bz * cy - by * cz) + ay * (bx * cz - bz * cx)) + az * (by * cx - bx * cy)
-            if volume <= 0.0:
+            if volume <= 0.0 and (volume == 0.0 or not borders[f]):
                 continue
             if min(az, bz, cz) >= near:
                 u0, v0, u1, v1, u2, v2 = ax / az, ay / az, bx / bz, by / bz, cx / cz, cy / cz
@@ -56,10 +58,14 @@ def find_triangles(view, people, scene, work):
             if not _pixels(y0, y1, view.top, view.step, view.height, place, count, 3):
                 continue
             place[count, 0] = f
+            lit = front
+            if volume < 0.0:  # the back of the triangle: the other way round
+                j, k, volume, lit = k, j, -volume, back
+                bx, by, bz, cx, cy, cz = cx, cy, cz, bx, by, bz
             edge(bx, by, bz, ax, ay, az, records, count, 0)
             edge(cx, cy, cz, bx, by, bz, records, count, 3)
             edge(ax, ay, az, cx, cy, cz, records, count, 6)
-            _interpolate(i, j, k, volume, light, records, count)
+            _interpolate(i, j, k, volume, lit, records, count)
             if pattern[f]:
                 _interpolate_anchors(i, j, k, volume, anchors, records, count)
             count += 1
@@ -81,13 +87,15 @@ def _to_camera(view, vertices, first, last, points):
 
 
 @_jit
-def _light_vertices(vertices, normals, first, last, lamps, ambient, light):
+def _light_vertices(vertices, normals, first, last, lamps, ambient, front, back):
+    """Write the light on both sides of the surface at each vertex."""
     for i in range(first, last):
-        total = ambient
+        nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
+        front[i] = back[i] = ambient
         for n in range(lamps.shape[0]):
             dx, dy, dz = lamps[n, 0] - vertices[i, 0], lamps[n, 1] - vertices[i, 1], lamps[n, 2] - vertices[i, 2]
-            total += lamp_light(dx, dy, dz, normals[i, 0], normals[i, 1], normals[i, 2], lamps[n, 3])
-        light[i] = total
+            front[i] += lamp_light(dx, dy, dz, nx, ny, nz, lamps[n, 3])
+            back[i] += lamp_light(dx, dy, dz, -nx, -ny, -nz, lamps[n, 3])
 
 
 @_jit

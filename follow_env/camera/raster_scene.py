@@ -8,13 +8,15 @@ import numpy as np
 from follow_env.camera.raster_shade import SOFT
 from follow_env.camera.textures import TEXTURES
 from follow_env.config import choose
-from follow_env.scene import Box, Light, Material, Scene
+from follow_env.scene import Box, Capsule, Cylinder, Light, Material, Scene, Sphere
 
 FLOOR_THICKNESS = 0.1
 FACES = 6
 """Faces of a box in the order -x, +x, -y, +y, -z, +z of its own frame."""
 CYLINDER_PARTS = 3
 """Side, top and bottom of a cylinder."""
+SEAM = 1e-4
+"""How far the ends of a capsule overlap its straight part, in radii."""
 
 
 class ScenePack(NamedTuple):
@@ -22,10 +24,13 @@ class ScenePack(NamedTuple):
 
     Attributes:
         boxes: (B, 8) float64, centre, half size (m), cosine and sine of the yaw; the floor is the first.
-        cylinders: (C, 5) float64, x, y, lower and upper end, radius, m.
-        surfaces: (S, 16) float32, how each surface is shaded: normal (3) and its growth along x and y, plane offset,
-            texture axes s (3 + 1) and t (3 + 1), albedo (3); row 0 stands for nothing, then six rows a box and three a
-            cylinder.
+        cylinders: (C, 6) float64, x, y, lower and upper end, radius (m), and 1 if the ends are closed: the straight
+            part of a capsule is open.
+        balls: (N, 6) float64, centre, radius and the lowest and highest z of the part that counts, m: a sphere, or
+            the upper or lower half of one.
+        surfaces: (S, 17) float32, how each surface is shaded: normal (3) and its growth along x and y, plane offset,
+            texture axes s (3 + 1) and t (3 + 1), albedo (3), the normal's growth along z; row 0 stands for nothing,
+            then six rows a box, three a cylinder and one a ball.
         textures: (S,) uint8, index into `TEXTURES`.
         lamps: (L, 4) float32, position (m) and strength, such that a surface that faces the lamp 1 m above the floor
             right below it gets its intensity, as in `Scene.illumination`.
@@ -34,6 +39,7 @@ class ScenePack(NamedTuple):
 
     boxes: np.ndarray
     cylinders: np.ndarray
+    balls: np.ndarray
     surfaces: np.ndarray
     textures: np.ndarray
     lamps: np.ndarray
@@ -45,8 +51,20 @@ def pack_scene(scene: Scene) -> ScenePack:
     x0, x1, y0, y1 = scene.bounds
     centre, size = (0.5 * (x0 + x1), 0.5 * (y0 + y1), -0.5 * FLOOR_THICKNESS), (x1 - x0, y1 - y0, FLOOR_THICKNESS)
     boxes = [Box(centre, size, scene.floor), *(p for p in scene.primitives if isinstance(p, Box))]
-    cylinders = [p for p in scene.primitives if not isinstance(p, Box)]
-    surfaces: list[list[float]] = [[0.0] * 16]
+    capsules = [p for p in scene.primitives if isinstance(p, Capsule)]
+    cylinders = [
+        *(p for p in scene.primitives if isinstance(p, Cylinder)),
+        *(Cylinder(p.centre, p.radius, p.straight, p.material) for p in capsules),
+    ]
+    closed = len(cylinders) - len(capsules)
+    balls = [_ball(p, 0) for p in scene.primitives if isinstance(p, Sphere)]
+    for capsule in capsules:
+        x, y, z = capsule.centre
+        balls += [
+            _ball(Sphere((x, y, z + half * 0.5 * capsule.straight), capsule.radius, capsule.material), half)
+            for half in (-1, 1)
+        ]
+    surfaces: list[list[float]] = [[0.0] * 17]
     textures = [0]
 
     def add(
@@ -54,8 +72,9 @@ def pack_scene(scene: Scene) -> ScenePack:
         origin: tuple[float, float, float],
         normal: list[float],
         axes: tuple[tuple[float, float, float], tuple[float, float, float]],
+        swell: float = 0.0,
     ) -> None:
-        surfaces.append([*normal, *_axis(axes[0], origin), *_axis(axes[1], origin), *material.colour])
+        surfaces.append([*normal, *_axis(axes[0], origin), *_axis(axes[1], origin), *material.colour, swell])
         textures.append(TEXTURES.index(choose("texture", material.texture, TEXTURES)))
 
     for box in boxes:
@@ -69,18 +88,29 @@ def pack_scene(scene: Scene) -> ScenePack:
             if box.material.texture == "wood" and box.size[first] < box.size[second]:
                 first, second = second, first  # the grain runs along the longer side
             add(box.material, box.centre, [*normal, 0.0, offset], (frame[first], frame[second]))
+    around = (math.sqrt(0.5), math.sqrt(0.5), 0.0), (0.0, 0.0, 1.0)
     for cylinder in cylinders:
         x, y, z = cylinder.centre
         bend, half = 1.0 / cylinder.radius, 0.5 * cylinder.height
-        around = (math.sqrt(0.5), math.sqrt(0.5), 0.0)
-        add(cylinder.material, cylinder.centre, [-x * bend, -y * bend, 0.0, bend, 0.0], (around, (0.0, 0.0, 1.0)))
+        add(cylinder.material, cylinder.centre, [-x * bend, -y * bend, 0.0, bend, 0.0], around)
         for up in (1.0, -1.0):
             flat = [0.0, 0.0, up, 0.0, up * z + half]
             add(cylinder.material, cylinder.centre, flat, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+    for ball, _, _ in balls:
+        bend = 1.0 / ball.radius
+        add(ball.material, ball.centre, [*(-v * bend for v in ball.centre), bend, 0.0], around, bend)
     pack = ScenePack(
         _table([[*b.centre, *(0.5 * v for v in b.size), math.cos(b.yaw), math.sin(b.yaw)] for b in boxes], 8),
-        _table([[x, y, z - c.height / 2, z + c.height / 2, c.radius] for c in cylinders for x, y, z in [c.centre]], 5),
-        _table(surfaces, 16).astype(np.float32),
+        _table(
+            [
+                [x, y, z - c.height / 2, z + c.height / 2, c.radius, k < closed]
+                for k, c in enumerate(cylinders)
+                for x, y, z in [c.centre]
+            ],
+            6,
+        ),
+        _table([[*b.centre, b.radius, low, high] for b, low, high in balls], 6),
+        _table(surfaces, 17).astype(np.float32),
         np.array(textures, np.uint8),
         _table([_lamp(m) for m in scene.lights], 4).astype(np.float32),
         np.float32(scene.ambient),
@@ -89,6 +119,15 @@ def pack_scene(scene: Scene) -> ScenePack:
         if not np.isfinite(array).all():
             raise ValueError(f"the scene {scene.name!r} has {name} that are not finite; expected finite metres")
     return pack
+
+
+def _ball(sphere: Sphere, half: int) -> tuple[Sphere, float, float]:
+    """Return a sphere with its lowest and highest z: all of it (0), or the lower (-1) or upper (1) half.
+
+    A half reaches a hair too far, where it lies less than 1e-8 radii inside a capsule's straight part: no crack.
+    """
+    z, radius = sphere.centre[2], sphere.radius
+    return sphere, z - (SEAM if half > 0 else 2.0) * radius, z + (SEAM if half < 0 else 2.0) * radius
 
 
 def _lamp(light: Light) -> list[float]:

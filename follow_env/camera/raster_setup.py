@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Kernels that prepare a picture: which flat facets and cylinders may be seen, and where.
+"""Kernels that prepare a picture: which flat facets, cylinders and balls may be seen, and where.
 
 Camera frame: X right, Y down, Z forward along the optical axis; the camera is level. A pixel looks along the ray
 (X, Y, 1), and a plane n . P = d is seen at 1/Z = (nx X + ny Y + nz) / d: affine in the picture, exact everywhere.
@@ -163,23 +163,58 @@ def find_cylinders(view, cylinders, work):
             continue
         gap, rise = max(math.sqrt(dx * dx + dy * dy) - radius, 0.0), max(top, -bottom, 0.0)
         cut = gap * gap + rise * rise <= reach * reach
-        front, back = z - radius, z + radius
-        tx0, tx1, ty0, ty1 = 0, view.columns - 1, 0, view.rows - 1
-        if front > near:
-            left, right = x - radius, x + radius
-            tx0, tx1 = tile_range(
-                min(left / front, left / back), max(right / front, right / back), view.left, view.step, view.columns
-            )
-            ty0, ty1 = tile_range(
-                min(top / front, top / back), max(bottom / front, bottom / back), view.top, view.step, view.rows
-            )
-        if tx0 > tx1 or ty0 > ty1 or tx0 >= view.columns or ty0 >= view.rows:
+        if not _round_tiles(view, x, z, radius, top, bottom, work.round_places, count, n):
             continue
-        rounds, place = work.rounds, work.round_places
+        rounds = work.rounds
         rounds[count, 0], rounds[count, 1], rounds[count, 2] = x, z, radius
         rounds[count, 3], rounds[count, 4] = top, bottom
-        rounds[count, 5] = 1.0 / max(front, near)
-        rounds[count, 6], rounds[count, 7] = top > 0.0 or cut, bottom < 0.0 or cut
-        place[count, 0], place[count, 1], place[count, 2], place[count, 3], place[count, 4] = n, tx0, tx1, ty0, ty1
+        rounds[count, 5] = 1.0 / max(z - radius, near)
+        closed = cylinders[n, 5] > 0.0
+        rounds[count, 6], rounds[count, 7] = closed and (top > 0.0 or cut), closed and (bottom < 0.0 or cut)
         count += 1
     return count
+
+
+@_jit
+def find_balls(view, balls, work):
+    """Fill `work.balls` with the balls that may be seen; return how many.
+
+    A record is (X, Y, Z of the centre, its squared distance less the squared radius, least and greatest Y of the part
+    that counts, greatest 1/Z).
+    """
+    ex, ey, ez, c, s, near = view.x, view.y, view.z, view.cosine, view.sine, view.near
+    records = work.balls
+    count = 0
+    for n in range(balls.shape[0]):
+        dx, dy, y, radius = balls[n, 0] - ex, balls[n, 1] - ey, ez - balls[n, 2], balls[n, 3]
+        x, z = s * dx - c * dy, c * dx + s * dy
+        if outside(x, y, z, radius, view):
+            continue
+        if not _round_tiles(view, x, z, radius, y - radius, y + radius, work.ball_places, count, n):
+            continue
+        records[count, 0], records[count, 1], records[count, 2] = x, y, z
+        records[count, 3] = ((x * x + y * y) + z * z) - radius * radius
+        records[count, 4], records[count, 5] = ez - balls[n, 5], ez - balls[n, 4]
+        records[count, 6] = 1.0 / max(z - radius, near)
+        count += 1
+    return count
+
+
+@_jit
+def _round_tiles(view, x, z, radius, top, bottom, place, row, number):
+    """Write the number of a round solid and the tiles that may show it; False if none does.
+
+    It lies within `radius` of (X, Z) and between the Y `top` and `bottom`.
+    """
+    front, back = z - radius, z + radius
+    tx0, tx1, ty0, ty1 = 0, view.columns - 1, 0, view.rows - 1
+    if front > view.near:
+        left, right = x - radius, x + radius
+        tx0, tx1 = tile_range(
+            min(left / front, left / back), max(right / front, right / back), view.left, view.step, view.columns
+        )
+        ty0, ty1 = tile_range(
+            min(top / front, top / back), max(bottom / front, bottom / back), view.top, view.step, view.rows
+        )
+    place[row, 0], place[row, 1], place[row, 2], place[row, 3], place[row, 4] = number, tx0, tx1, ty0, ty1
+    return tx0 <= tx1 and ty0 <= ty1 and tx0 < view.columns and ty0 < view.rows

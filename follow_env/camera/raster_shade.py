@@ -57,6 +57,9 @@ def shade_surface(number, first, last, view, surfaces, texture, lamps, ambient, 
     height = ((n0 * ex + n1 * ey) + n2 * ez) - surfaces[number, 4] if bend == _ZERO else np.float32(view.far)
     if height < _ZERO:
         n0, n1, n2, height = -n0, -n1, -n2, -height
+    swell = surfaces[number, 16]
+    if bend != _ZERO and swell == _ZERO and (n0 + bend * ex) ** 2 + (n1 + bend * ey) ** 2 < _ONE:
+        n0, n1, bend = -n0, -n1, -bend  # a cylinder from inside
     for k in range(first, last):
         distance = lanes[DISTANCE + k]
         px = ex + distance * (c + s * lanes[X + k])
@@ -67,9 +70,17 @@ def shade_surface(number, first, last, view, surfaces, texture, lamps, ambient, 
         lanes[LIGHT + k] = ambient
     for n in range(lamps.shape[0]):
         lx, ly, lz, strength = lamps[n, 0], lamps[n, 1], lamps[n, 2], lamps[n, 3]
+        if swell == _ZERO:
+            for k in range(first, last):
+                dx, dy, dz = lx - lanes[POINT_X + k], ly - lanes[POINT_Y + k], lz - lanes[POINT_Z + k]
+                lanes[LIGHT + k] += lamp_light(dx, dy, dz, lanes[NORMAL_X + k], lanes[NORMAL_Y + k], n2, strength)
+            continue
         for k in range(first, last):
-            dx, dy, dz = lx - lanes[POINT_X + k], ly - lanes[POINT_Y + k], lz - lanes[POINT_Z + k]
-            lanes[LIGHT + k] += lamp_light(dx, dy, dz, lanes[NORMAL_X + k], lanes[NORMAL_Y + k], n2, strength)
+            px, py, pz = lanes[POINT_X + k], lanes[POINT_Y + k], lanes[POINT_Z + k]
+            nx, ny, nz = lanes[NORMAL_X + k], lanes[NORMAL_Y + k], n2 + swell * pz
+            seen_from_inside = (nx * (px - ex) + ny * (py - ey)) + nz * (pz - ez) > _ZERO
+            side = -_ONE if seen_from_inside else _ONE
+            lanes[LIGHT + k] += lamp_light(lx - px, ly - py, lz - pz, side * nx, side * ny, side * nz, strength)
     if texture:
         s0, s1, s2, s3 = surfaces[number, 5], surfaces[number, 6], surfaces[number, 7], surfaces[number, 8]
         t0, t1, t2, t3 = surfaces[number, 9], surfaces[number, 10], surfaces[number, 11], surfaces[number, 12]

@@ -42,6 +42,7 @@ class PeoplePack(NamedTuple):
     faces: np.ndarray
     colours: np.ndarray
     pattern: np.ndarray
+    borders: np.ndarray
     anchors: np.ndarray
     ids: np.ndarray
     starts: np.ndarray
@@ -63,8 +64,11 @@ class Workspace(NamedTuple):
     done: np.ndarray
     rounds: np.ndarray
     round_places: np.ndarray
+    balls: np.ndarray
+    ball_places: np.ndarray
     camera_points: np.ndarray
-    vertex_light: np.ndarray
+    front_light: np.ndarray
+    back_light: np.ndarray
     triangles: np.ndarray
     triangle_places: np.ndarray
 
@@ -93,7 +97,10 @@ def make_workspace(scene: ScenePack, vertices: int, faces: int) -> Workspace:
         whole(TILE * TILE),
         np.zeros((rounds, 8)),
         whole(rounds, 5),
+        np.zeros((len(scene.balls), 7)),
+        whole(len(scene.balls), 5),
         np.zeros((vertices, 3)),
+        real(vertices),
         real(vertices),
         real(faces + 1, TRIANGLE_NUMBERS),
         whole(faces + 1, 5),

@@ -16,7 +16,7 @@ import pybullet
 from follow_env.camera.frame import RGBDFrame
 from follow_env.camera.mesh import Mesh, Placed
 from follow_env.camera.pinhole import CameraPose, PinholeCamera
-from follow_env.scene import Box, Cylinder, Scene
+from follow_env.scene import Box, Capsule, Primitive, Scene, Sphere
 
 LIGHT_DIRECTION = (0.25, 0.45, 1.0)
 AWAY = (0.0, 0.0, -1000.0)
@@ -24,9 +24,14 @@ AWAY = (0.0, 0.0, -1000.0)
 
 
 class TinyRenderer:
-    """Draws `scene` and people with PyBullet's TinyRenderer, without shadows."""
+    """Draws `scene` and people with PyBullet's TinyRenderer, without shadows, one ray a pixel."""
 
     def __init__(self, scene: Scene, camera: PinholeCamera) -> None:
+        if camera.config.supersample != 1:
+            raise ValueError(
+                f"the renderer 'tiny' cannot draw with supersample {camera.config.supersample}; expected 1, or use "
+                "the renderer 'raster'"
+            )
         self._scene, self._camera = scene, camera
         self._client = pybullet.connect(pybullet.DIRECT)
         x0, x1, y0, y1 = scene.bounds
@@ -108,35 +113,23 @@ class TinyRenderer:
         self._people.append((person.mesh, bodies))
         return bodies
 
-    def _add_primitive(self, primitive: Box | Cylinder) -> None:
-        client, colour = self._client, (*primitive.material.colour, 1.0)
+    def _add_primitive(self, primitive: Primitive) -> None:
+        if isinstance(primitive, Sphere | Capsule):
+            straight = primitive.straight if isinstance(primitive, Capsule) else 0.0
+            points, normals, faces = _lathe(primitive.radius, straight)
+            self._add_mesh(points + primitive.centre, normals, faces, np.array(primitive.material.colour))
+            return
+        client, yaw = self._client, primitive.yaw if isinstance(primitive, Box) else 0.0
+        look = dict(rgbaColor=(*primitive.material.colour, 1.0), specularColor=(0.0, 0.0, 0.0), physicsClientId=client)
         if isinstance(primitive, Box):
-            shape = pybullet.createVisualShape(
-                pybullet.GEOM_BOX,
-                halfExtents=[0.5 * s for s in primitive.size],
-                rgbaColor=colour,
-                specularColor=(0.0, 0.0, 0.0),
-                physicsClientId=client,
-            )
-            yaw = primitive.yaw
+            half = [0.5 * s for s in primitive.size]
+            shape = pybullet.createVisualShape(pybullet.GEOM_BOX, halfExtents=half, **look)
         else:
             shape = pybullet.createVisualShape(
-                pybullet.GEOM_CYLINDER,
-                radius=primitive.radius,
-                length=primitive.height,
-                rgbaColor=colour,
-                specularColor=(0.0, 0.0, 0.0),
-                physicsClientId=client,
+                pybullet.GEOM_CYLINDER, radius=primitive.radius, length=primitive.height, **look
             )
-            yaw = 0.0
-        pybullet.createMultiBody(
-            0,
-            -1,
-            shape,
-            primitive.centre,
-            (0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw)),
-            physicsClientId=client,
-        )
+        turn = (0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw))
+        pybullet.createMultiBody(0, -1, shape, primitive.centre, turn, physicsClientId=client)
 
     def _add_mesh(self, vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray, colour: np.ndarray) -> int:
         """Add a mesh by way of an OBJ file: PyBullet loses the memory of meshes that are handed over as lists."""
@@ -154,3 +147,24 @@ class TinyRenderer:
                 physicsClientId=self._client,
             )
             return pybullet.createMultiBody(0, -1, shape, physicsClientId=self._client)
+
+
+def _lathe(radius: float, straight: float, rows: int = 16, sides: int = 48) -> tuple[np.ndarray, ...]:
+    """Return points (V, 3), normals (V, 3) and faces (F, 3) of a capsule around the origin; a sphere if not straight.
+
+    PyBullet's own capsule is a low-poly cone.
+    """
+    around = [2.0 * math.pi * k / sides for k in range(sides)]
+    points, normals = [], []
+    for half in (1.0, -1.0):
+        for i in range(rows + 1):
+            tilt = 0.5 * math.pi * (i if half > 0.0 else rows + i) / rows
+            out, up = math.sin(tilt), math.cos(tilt)
+            normals += [(out * math.cos(a), out * math.sin(a), up) for a in around]
+            points += [(radius * x, radius * y, radius * z + 0.5 * half * straight) for x, y, z in normals[-sides:]]
+    faces = []
+    for i in range(2 * rows + 1):
+        for k in range(sides):
+            a, b = i * sides + k, i * sides + (k + 1) % sides
+            faces += [(a, a + sides, b), (b, a + sides, b + sides)]
+    return np.array(points), np.array(normals), np.array(faces)

@@ -1,6 +1,6 @@
 """Paper B's indoor scene (figure 5): an office with furniture and clutter on both sides of the route."""
 
-from follow_env.scene import Box, Cylinder, Light, Material, Scene
+from follow_env.scene import Box, Cylinder, Light, Material, Primitive, Scene
 
 WALL = Material((0.88, 0.87, 0.82))
 BRICK = Material((0.66, 0.45, 0.36), texture="brick")
@@ -24,7 +24,7 @@ X0, X1, HALF, HEIGHT = -3.0, 19.0, 4.5, 2.8
 def indoor() -> Scene:
     """Return an office of 22 m x 9 m x 2.8 m: desks, chairs, shelves, plants, pillars and boxes beside the route."""
     middle, length = 0.5 * (X0 + X1), X1 - X0
-    parts: list[Box | Cylinder] = [
+    parts: list[Primitive] = [
         Box((middle, HALF + 0.05, HEIGHT / 2), (length, 0.1, HEIGHT), WALL),
         Box((middle, -HALF - 0.05, HEIGHT / 2), (length, 0.1, HEIGHT), WALL),
         Box((X0 - 0.05, 0.0, HEIGHT / 2), (0.1, 2 * HALF + 0.2, HEIGHT), BRICK),
@@ -52,7 +52,7 @@ def indoor() -> Scene:
     return Scene("indoor", tuple(parts), FLOOR, lights, 0.38, (X0, X1, -HALF, HALF))
 
 
-def _desk(x: float, y: float, yaw: float) -> list[Box | Cylinder]:
+def _desk(x: float, y: float, yaw: float) -> list[Primitive]:
     return [
         Box((x, y, 0.73), (1.6, 0.8, 0.04), WOOD, yaw),
         Box((x, y, 0.36), (1.4, 0.05, 0.70), STEEL, yaw),
@@ -60,7 +60,7 @@ def _desk(x: float, y: float, yaw: float) -> list[Box | Cylinder]:
     ]
 
 
-def _chair(x: float, y: float, yaw: float) -> list[Box | Cylinder]:
+def _chair(x: float, y: float, yaw: float) -> list[Primitive]:
     return [
         Box((x, y, 0.46), (0.46, 0.46, 0.08), FABRIC, yaw),
         Box((x, y + (-0.2 if y > 0 else 0.2), 0.78), (0.44, 0.06, 0.50), FABRIC, yaw),
@@ -69,14 +69,14 @@ def _chair(x: float, y: float, yaw: float) -> list[Box | Cylinder]:
     ]
 
 
-def _shelf(x: float, y: float) -> list[Box | Cylinder]:
+def _shelf(x: float, y: float) -> list[Primitive]:
     board = [Box((x, y, z), (1.8, 0.4, 0.03), WOOD) for z in (0.1, 0.55, 1.0, 1.45, 1.9)]
     sides = [Box((x + dx, y, 0.95), (0.03, 0.4, 1.9), WOOD) for dx in (-0.9, 0.9)]
     books = [Box((x + dx, y, z), (0.5, 0.25, 0.28), BOOKS) for dx, z in ((-0.5, 0.26), (0.3, 0.71), (-0.2, 1.16))]
     return [*board, *sides, *books]
 
 
-def _plant(x: float, y: float) -> list[Box | Cylinder]:
+def _plant(x: float, y: float) -> list[Primitive]:
     return [
         Cylinder((x, y, 0.2), 0.16, 0.4, POT),
         Cylinder((x, y, 0.75), 0.05, 0.7, LEAF),

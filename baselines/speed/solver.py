@@ -8,7 +8,7 @@ from functools import partial
 
 from baselines.speed.timing import Cost, measure
 from follow_env.config import RobotConfig
-from follow_env.physics import PHYSICS_HZ, World
+from follow_env.physics import PHYSICS_HZ, SOLVER_ITERATIONS, World
 from follow_env.robot import DiffDrive, advance
 from follow_env.scene import Material, Scene
 from follow_env.scenes import make_scene
@@ -32,7 +32,7 @@ class SolverCost:
         position_error: Largest distance from where the equations say, over the motions' 2 s, m.
         heading_error: The same of the heading, rad.
         creep: How far the robot moves in 14 s of standing still, m.
-        cost: Of 8 physics steps in the indoor scene, s.
+        cost: Of 8 physics steps in the indoor scene while driving a circle, s.
     """
 
     iterations: int
@@ -44,21 +44,26 @@ class SolverCost:
 
 def measure_solver(count: int) -> list[SolverCost]:
     """Return a row for each of `ITERATIONS`; the times are those of `count` calls."""
-    config, indoor = RobotConfig(), make_scene("indoor")
-    rolling = {n: World(indoor, config, n) for n in ITERATIONS}
-    for world in rolling.values():
-        world.reset((0.0, 0.0, 0.0), (8.0, 0.0, 0.0))
-        world.step(0.4, 0.4, PHYSICS_HZ)
-    costs = measure({str(n): partial(world.simulate, SUBSTEPS) for n, world in rolling.items()}, count)
-    for world in rolling.values():
+    indoor = make_scene("indoor")
+    circling = {n: circling_world(indoor, n) for n in ITERATIONS}
+    costs = measure({str(n): partial(world.simulate, SUBSTEPS) for n, world in circling.items()}, count)
+    for world in circling.values():
         world.close()
     rows = []
     for n in ITERATIONS:
-        world = World(EMPTY, config, n)
+        world = World(EMPTY, RobotConfig(), n)
         away, turned = zip(*(_errors(world, twist) for twist in MOTIONS), strict=True)
         rows.append(SolverCost(n, max(away), max(turned), _creep(world), costs[str(n)]))
         world.close()
     return rows
+
+
+def circling_world(scene: Scene, solver_iterations: int = SOLVER_ITERATIONS) -> World:
+    """Return a world in which the robot drives a circle of 1 m across, so that it never runs into anything."""
+    world = World(scene, RobotConfig(), solver_iterations)
+    world.reset((0.0, -0.5, 0.0), (8.0, 0.0, 0.0))
+    world.step(*world.drive.wheels(0.4, 0.8), PHYSICS_HZ)
+    return world
 
 
 def _errors(world: World, twist: tuple[float, float]) -> tuple[float, float]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from baselines.policy import make_follower
+from baselines.speed.solver import circling_world
 from baselines.speed.timing import Cost, measure
 from follow_env.env import FollowEnv
-from follow_env.physics import World
 
 BARE = "8 bare physics steps"
 
@@ -41,9 +41,7 @@ def measure_steps(scene: str, steps: int, resets: int) -> list[StepCost]:
         "step, obs=rgbd_uint8 84x84": FollowEnv(scene, obs="rgbd_uint8", camera={"width": 84, "height": 84}),
     }
     first = next(iter(envs.values()))
-    world = World(first.scene, first.robot_config)
-    world.reset((0.0, 0.0, 0.0), (8.0, 0.0, 0.0))
-    world.step(0.4, 0.4, 240)
+    world = circling_world(first.scene)
     operations: dict[str, Callable[[], object]] = {BARE: lambda: world.simulate(8)}
     for what, env in envs.items():
         operations[what] = _follow(env, scene) if "AKF" in what else _drive(env)

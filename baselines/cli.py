@@ -84,11 +84,21 @@ def _calibrate(parsed: argparse.Namespace) -> int:
 
 def _speed(parsed: argparse.Namespace) -> int:
     from baselines import speed
+    from baselines.speed.table import document, table
 
-    costs = speed.speed(quick=parsed.quick)
-    print(speed.table(costs))
     if parsed.out is not None:
-        parsed.out.write_text(speed.document(costs), encoding="utf-8")
+        try:
+            parsed.out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            print(f"follow: {parsed.out} cannot be made ({error.strerror}); name another --out", file=sys.stderr)
+            return BAD_INPUT
+    effort = speed.QUICK if parsed.quick else speed.FULL
+    report = speed.speed(effort, lambda what: print(f"measuring: {what}", file=sys.stderr, flush=True))
+    text = table(report)
+    print(text)
+    if parsed.out is not None:
+        (parsed.out / "speed.md").write_text(text + "\n", encoding="utf-8")
+        (parsed.out / "speed.json").write_text(document(report), encoding="utf-8")
     return 0
 
 
@@ -176,7 +186,7 @@ def _add_calibrate(commands: _Commands) -> None:
 def _add_speed(commands: _Commands) -> None:
     speed = commands.add_parser("speed", help="measure steps, resets and frames on this machine")
     speed.add_argument("--quick", action="store_true", help="take a tenth of the samples")
-    speed.add_argument("--out", type=_output_file, metavar="FILE", help="also write the figures as JSON")
+    speed.add_argument("--out", type=Path, metavar="DIR", help="also write speed.md and speed.json into this folder")
     speed.set_defaults(run=_speed)
 
 

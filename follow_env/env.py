@@ -143,6 +143,7 @@ class FollowEnv(gymnasium.Env):
             )
         self.robot_config = build("robot", RobotConfig(), robot)
         self.camera = PinholeCamera(build("camera", CameraConfig(), camera))
+        self._half_field = math.tan(0.5 * self.camera.hfov)
         self._sensor = self._sensor_in_use = sensor_config(sensor)
         self.scene = make_scene(scene, light)
         self._world: World | None = None
@@ -184,9 +185,10 @@ class FollowEnv(gymnasium.Env):
         ahead = (x + SET_POINT * math.cos(yaw), y + SET_POINT * math.sin(yaw), yaw)
         self._route = make_route(options.get("route", self._route_name), self.scene, ahead, self.np_random)
         robot_pose = _pose(options.get("robot_pose", (x, y, yaw)))
-        self._world.reset(robot_pose, self._route.pose(0.0))
-
         self._steps = 0
+        self._person_pose = self._route.pose(self.time)
+        self._world.reset(robot_pose, self._person_pose)
+
         self._twist = (0.0, 0.0)
         self._last_action: np.ndarray = np.zeros(2, np.float32)
         self._out_of_view = self._longest_out_of_view = 0
@@ -221,9 +223,11 @@ class FollowEnv(gymnasium.Env):
             wheels = first * robot.max_wheel_speed, second * robot.max_wheel_speed
 
         self._steps += 1
-        self._world.place_person(self._route.pose(self.time))
+        self._person_pose = self._route.pose(self.time)
+        self._world.place_person(self._person_pose)
         self._twist = self._world.step(*wheels, self._substeps)
-        self._saturated = max(abs(a - b) for a, b in zip(self._world.wheel_command, wheels, strict=True)) > 1e-9
+        left, right = self._world.wheel_command
+        self._saturated = max(abs(left - wheels[0]), abs(right - wheels[1])) > 1e-9
         self._collision = self._world.collision()
         self._look()
         effort = max(abs(first - float(self._last_action[0])), abs(second - float(self._last_action[1])))
@@ -328,31 +332,38 @@ class FollowEnv(gymnasium.Env):
         """Update the truth: poses, bearing, distance, visibility and what is counted from them."""
         assert self._route is not None
         assert self._world is not None
-        t = self.time
         self._robot_pose = self._world.robot_pose()
-        self._person_pose = self._route.pose(t)
-        self._person_velocity = self._route.velocity(t)
+        self._person_velocity = self._route.velocity(self.time)
         x, y, yaw = self._robot_pose
         dx, dy = self._person_pose[0] - x, self._person_pose[1] - y
         cosine, sine = math.cos(yaw), math.sin(yaw)
         self._distance, left = cosine * dx + sine * dy, -sine * dx + cosine * dy
         self._bearing = math.atan2(left, self._distance)
         self._surface_distance = max(math.sqrt(dx * dx + dy * dy) - self.robot_config.hull_radius - PERSON_RADIUS, 0.0)
-        self._visible = self._in_view(self._distance - self.robot_config.camera_forward, left)
+        self._visible = self._in_view(self._distance - self.robot_config.camera_forward, left, cosine, sine)
         self._out_of_view = 0 if self._visible else self._out_of_view + 1
         self._longest_out_of_view = max(self._longest_out_of_view, self._out_of_view)
         low, high = BAND_DISTANCE
         self._in_band += low <= self._distance <= high and abs(self._bearing) <= BAND_BEARING
 
-    def _in_view(self, depth: float, left: float) -> bool:
-        """Whether any of the trunk (axis, left or right side) is in the camera's field with a free line of sight."""
+    def _in_view(self, depth: float, left: float, cosine: float, sine: float) -> bool:
+        """Whether any of the trunk (axis, left or right side) is in the camera's field with a free line of sight.
+
+        Args:
+            depth: of the person ahead of the camera, m.
+            left: of the person to the left of the optical axis, m.
+            cosine: of the robot's yaw.
+            sine: of the robot's yaw.
+        """
         assert self._world is not None
+        if depth <= 0.3:
+            return False
+        reach = depth * self._half_field
         eye = self.camera_pose()
-        reach = depth * math.tan(0.5 * self.camera.hfov)
         x, y, _ = self._person_pose
         for offset in (0.0, HALF_TRUNK, -HALF_TRUNK):
-            if depth > 0.3 and abs(left + offset) <= reach:
-                point = (x - offset * math.sin(eye.yaw), y + offset * math.cos(eye.yaw), 1.2)
+            if abs(left + offset) <= reach:
+                point = (x - offset * sine, y + offset * cosine, 1.2)
                 if self._world.line_of_sight((eye.x, eye.y, eye.z), point):
                     return True
         return False

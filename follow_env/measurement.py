@@ -30,7 +30,7 @@ class GaussMarkov:
 
     def step(self, rng: np.random.Generator) -> list[float]:
         """Return the next values (a list of `size` floats)."""
-        draws = [float(d) for d in rng.standard_normal(len(self._values))]
+        draws: list[float] = rng.standard_normal(len(self._values)).tolist()
         if self._started:
             draws = [self._keep * v + self._fresh * d for v, d in zip(self._values, draws, strict=True)]
         self._values, self._started = draws, True
@@ -61,7 +61,7 @@ class MeasurementModel:
         config = self._config
         (bearing_error,) = self._bearing_error.step(rng)
         (distance_error,) = self._distance_error.step(rng)
-        renew, kind, size, miss = (float(u) for u in rng.random(4))
+        renew, kind, size, miss = rng.random(4).tolist()
         if renew < self._renew or not self._started:
             span = config.outlier_high - config.outlier_low
             self._outlier = config.outlier_low + span * size if kind < config.outlier_share else 0.0

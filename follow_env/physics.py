@@ -15,6 +15,7 @@ from follow_env.scene import Box, Capsule, Cylinder, Primitive, Scene, Sphere
 
 PHYSICS_HZ = 240
 SOLVER_ITERATIONS = 10
+"""Of the contact solver in each physics step; `follow speed` shows what fewer and more of them cost and give."""
 PERSON_RADIUS = 0.25
 PERSON_HEIGHT = 1.75
 CONTACT_BREAKING = 0.0005
@@ -39,9 +40,15 @@ class World:
     Args:
         scene: the place.
         config: the robot.
+        solver_iterations: of the contact solver in each physics step.
+
+    Raises:
+        ValueError: if `solver_iterations` is not a whole number from 1.
     """
 
-    def __init__(self, scene: Scene, config: RobotConfig) -> None:
+    def __init__(self, scene: Scene, config: RobotConfig, solver_iterations: int = SOLVER_ITERATIONS) -> None:
+        if type(solver_iterations) is not int or solver_iterations < 1:
+            raise ValueError(f"solver_iterations is {solver_iterations!r}; expected a whole number from 1")
         self.drive = DiffDrive(config)
         self.config = config
         self._client = pybullet.connect(pybullet.DIRECT)
@@ -49,7 +56,7 @@ class World:
         pybullet.setGravity(0, 0, -9.81, physicsClientId=client)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=1.0 / PHYSICS_HZ,
-            numSolverIterations=SOLVER_ITERATIONS,
+            numSolverIterations=solver_iterations,
             contactBreakingThreshold=CONTACT_BREAKING,
             deterministicOverlappingPairs=1,
             physicsClientId=client,

@@ -6,8 +6,10 @@ not depend on the control rate.
 """
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -23,8 +25,11 @@ CLEARANCE = 0.50
 CORNER_CUT = 0.15
 """How far a smooth turn passes inside the corner of its outline at most, m."""
 
-LARGEST_TURN = math.radians(50.0)
-"""Paper B's limit on a turn and on the heading against the start, rad."""
+SMALLEST_TURN, LARGEST_TURN = math.radians(20.0), math.radians(50.0)
+"""Paper B's limits on a turn; the larger one also on the heading against the start, rad."""
+
+OUTLINE = np.arange(0.0, 12.0, 0.4)
+"""Where an outline is sampled, m of the way."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,13 @@ class Turn:
     start: float
     duration: float
     angle: float
+
+    def turned(self, t: float) -> float:
+        """Return by how much the heading has changed at time t, rad."""
+        share = (t - self.start) / self.duration
+        if share <= 0.0:
+            return 0.0
+        return self.angle if share >= 1.0 else self.angle * 0.5 * (1.0 - math.cos(math.pi * share))
 
 
 class Route:
@@ -63,16 +75,11 @@ class Route:
         self.start, self.distance, self.duration, self.turns = start, distance, duration, turns
         self._ramp = ramp
         self._cruise = distance / (duration - ramp)
-        self._table = self._tabulate()
+        self._positions, self._table = self._tabulate()
 
     def speed(self, t: float) -> float:
         """Walking speed at time t, m/s."""
-        edge = min(t, self.duration - t)
-        if edge <= 0.0:
-            return 0.0
-        if edge >= self._ramp:
-            return self._cruise
-        return self._cruise * 0.5 * (1.0 - math.cos(math.pi * edge / self._ramp))
+        return _speed(t, self._cruise, self.duration, self._ramp)
 
     def walked(self, t: float) -> float:
         """Distance walked until time t, m."""
@@ -87,8 +94,7 @@ class Route:
         """Heading at time t, rad, ccw from the world's x axis."""
         heading = self.start[2]
         for turn in self.turns:
-            share = min(max((t - turn.start) / turn.duration, 0.0), 1.0)
-            heading += turn.angle * 0.5 * (1.0 - math.cos(math.pi * share))
+            heading += turn.turned(t)
         return heading
 
     def velocity(self, t: float) -> tuple[float, float]:
@@ -111,21 +117,43 @@ class Route:
 
     def points(self) -> np.ndarray:
         """Positions along the route, one each table step, (n, 2) in m."""
-        return np.array(self._table)[:, :2]
+        return self._positions.copy()
 
-    def _tabulate(self) -> list[tuple[float, float, float, float]]:
-        x, y, _ = self.start
-        vx0, vy0 = self.velocity(0.0)
-        table = [(x, y, vx0, vy0)]
-        for i in range(math.ceil(self.duration / TABLE_STEP)):
-            t = i * TABLE_STEP
-            vxm, vym = self.velocity(t + 0.5 * TABLE_STEP)
-            vx1, vy1 = self.velocity(t + TABLE_STEP)
-            x += TABLE_STEP / 6.0 * (vx0 + 4.0 * vxm + vx1)
-            y += TABLE_STEP / 6.0 * (vy0 + 4.0 * vym + vy1)
-            table.append((x, y, vx1, vy1))
-            vx0, vy0 = vx1, vy1
-        return table
+    def _tabulate(self) -> tuple[np.ndarray, list[tuple[float, float, float, float]]]:
+        """Return the positions (n, 2) and the rows (x, y, v_x, v_y), one each table step."""
+        times, speeds = _speeds(self._cruise, self.duration, self._ramp)
+        headings = [self.start[2]] * len(times)
+        for turn in self.turns:
+            first, last = bisect_right(times, turn.start), bisect_left(times, turn.start + turn.duration)
+            headings[first:last] = [
+                h + turn.turned(t) for h, t in zip(headings[first:last], times[first:last], strict=True)
+            ]
+            headings[last:] = [h + turn.angle for h in headings[last:]]
+        velocities = speeds * np.array(([math.cos(h) for h in headings], [math.sin(h) for h in headings]))
+        before, middle, after = velocities[:, :-2:2], velocities[:, 1::2], velocities[:, 2::2]
+        steps = TABLE_STEP / 6.0 * (before + 4.0 * middle + after)
+        start = np.array(self.start[:2])[:, None]
+        positions = np.cumsum(np.concatenate((start, steps), axis=1), axis=1)
+        return positions.T, list(zip(*positions.tolist(), *velocities[:, ::2].tolist(), strict=True))
+
+
+def _speed(t: float, cruise: float, duration: float, ramp: float) -> float:
+    edge = min(t, duration - t)
+    if edge <= 0.0:
+        return 0.0
+    if edge >= ramp:
+        return cruise
+    return cruise * 0.5 * (1.0 - math.cos(math.pi * edge / ramp))
+
+
+@lru_cache(maxsize=64)
+def _speeds(cruise: float, duration: float, ramp: float) -> tuple[tuple[float, ...], np.ndarray]:
+    """Return the times of the table and of the middles between its rows, in order, and the speeds then."""
+    times = [0.0]
+    for i in range(math.ceil(duration / TABLE_STEP)):
+        t = i * TABLE_STEP
+        times += [t + 0.5 * TABLE_STEP, t + TABLE_STEP]
+    return tuple(times), np.array([_speed(t, cruise, duration, ramp) for t in times])
 
 
 def paper_route(scene: Scene, start: tuple[float, float, float], rng: np.random.Generator) -> Route:
@@ -138,20 +166,21 @@ def paper_route(scene: Scene, start: tuple[float, float, float], rng: np.random.
     for _ in range(1000):
         turns = _draw_turns(count, rng)
         outline = _outline(start, turns)
-        if outline is None or scene.clearance(outline) < CLEARANCE - CORNER_CUT:
+        if outline is None or not scene.is_clear(outline, CLEARANCE - CORNER_CUT):
             continue
         route = Route(start, turns=turns)
-        if scene.clearance(route.points()[::3]) >= CLEARANCE:
+        if scene.is_clear(route.points()[::3], CLEARANCE):
             return route
     raise ValueError(f"no route of 12 m with turns of 20-50 deg fits the scene {scene.name!r}; widen its free lane")
 
 
 def _draw_turns(count: int, rng: np.random.Generator) -> tuple[Turn, ...]:
     """Draw `count` turns, in the order of time, within 1.5-12 s."""
-    begins = sorted(float(t) for t in rng.uniform(1.5, 12.0, count))
-    angles = rng.uniform(math.radians(20.0), LARGEST_TURN, count) * (1.0 - 2.0 * rng.integers(0, 2, count))
-    durations = rng.uniform(0.8, 1.6, count)
-    return tuple(Turn(b, float(d), float(a)) for b, d, a in zip(begins, durations, angles, strict=True))
+    begins = sorted(rng.uniform(1.5, 12.0, count).tolist())
+    sizes = rng.uniform(SMALLEST_TURN, LARGEST_TURN, count).tolist()
+    right = rng.integers(0, 2, count).tolist()
+    durations = rng.uniform(0.8, 1.6, count).tolist()
+    return tuple(Turn(begins[k], durations[k], -sizes[k] if right[k] else sizes[k]) for k in range(count))
 
 
 def _outline(start: tuple[float, float, float], turns: tuple[Turn, ...]) -> np.ndarray | None:
@@ -159,20 +188,22 @@ def _outline(start: tuple[float, float, float], turns: tuple[Turn, ...]) -> np.n
 
     Cheap enough to throw most candidates away before the exact path is integrated.
     """
-    x, y, heading = start
-    corners, walked, turned, last_end = [(0.0, x, y)], 0.0, 0.0, 0.0
-    for turn in (*turns, Turn(14.0, 0.0, 0.0)):
-        length = 12.0 * (turn.start + 0.5 * turn.duration) / 14.0 - walked
-        walked += length
-        x, y = x + length * math.cos(heading + turned), y + length * math.sin(heading + turned)
-        corners.append((walked, x, y))
+    turned, last_end = 0.0, 0.0
+    for turn in turns:
         turned += turn.angle
         if turn.start < last_end or abs(turned) > LARGEST_TURN:
             return None
         last_end = turn.start + turn.duration
-    table = np.array(corners)
-    along = np.arange(0.0, 12.0, 0.4)
-    return np.stack([np.interp(along, table[:, 0], table[:, i]) for i in (1, 2)], axis=1)
+    x, y, heading = start
+    along, xs, ys, turned = [0.0], [x], [y], 0.0
+    for turn in (*turns, Turn(14.0, 0.0, 0.0)):
+        length = 12.0 * (turn.start + 0.5 * turn.duration) / 14.0 - along[-1]
+        x, y = x + length * math.cos(heading + turned), y + length * math.sin(heading + turned)
+        along.append(along[-1] + length)
+        xs.append(x)
+        ys.append(y)
+        turned += turn.angle
+    return np.array((np.interp(OUTLINE, along, xs), np.interp(OUTLINE, along, ys))).T
 
 
 def straight_route(scene: Scene, start: tuple[float, float, float], rng: np.random.Generator) -> Route:

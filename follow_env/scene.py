@@ -10,6 +10,11 @@ from typing import TypeAlias
 
 import numpy as np
 
+CELL = 0.2
+"""Side of the cells of a scene's table of clearances, m."""
+CELL_REACH = 0.15
+"""The clearance differs by less than this within half a cell's diagonal, m."""
+
 
 @dataclass(frozen=True)
 class Material:
@@ -152,12 +157,39 @@ class Scene:
 
         Round obstacles count with their full radius; without obstacles the clearance is infinite.
         """
+        return float(self._distances(points).min())
+
+    def is_clear(self, points: np.ndarray, least: float) -> bool:
+        """Whether `clearance(points) >= least` (m); a table decides about most of the points (n, 2)."""
+        table, origin, last = self._table
+        cells = np.minimum(np.maximum((points - origin) * (1.0 / CELL), 0.0), last).astype(np.intp)
+        about = table[cells[:, 0], cells[:, 1]]
+        if (about < least - CELL_REACH).any():
+            return False
+        undecided = ~(about > least + CELL_REACH)
+        return not undecided.any() or self.clearance(points[undecided]) >= least
+
+    def _distances(self, points: np.ndarray) -> np.ndarray:
+        """Return the clearance of each of the points (n, 2), m."""
         centres, halves, axes, radii = self._footprints
         offset = points[:, None, :] - centres
         along = np.abs(offset[..., 0] * axes[:, 0] + offset[..., 1] * axes[:, 1])
         across = np.abs(offset[..., 1] * axes[:, 0] - offset[..., 0] * axes[:, 1])
         gap_x, gap_y = np.maximum(along - halves[:, 0], 0.0), np.maximum(across - halves[:, 1], 0.0)
-        return float(np.maximum(np.sqrt(gap_x * gap_x + gap_y * gap_y) - radii, 0.0).min(initial=math.inf))
+        distances = np.maximum(np.sqrt(gap_x * gap_x + gap_y * gap_y) - radii, 0.0)
+        least: np.ndarray = distances.min(axis=1, initial=math.inf)
+        return least
+
+    @functools.cached_property
+    def _table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Clearance at the middle of each cell, framed by cells that say NaN: unknown; its corner and last indices."""
+        x0, x1, y0, y1 = self.bounds
+        origin = np.array((x0 - CELL, y0 - CELL))
+        table = np.full((math.ceil((x1 - x0) / CELL) + 2, math.ceil((y1 - y0) / CELL) + 2), np.nan)
+        middles = origin + CELL * (np.moveaxis(np.indices(table.shape), 0, -1) + 0.5)
+        for column, points in zip(table[1:-1, 1:-1], middles[1:-1, 1:-1], strict=True):
+            column[:] = self._distances(points)
+        return table, origin, np.array(table.shape) - 1.0
 
     @functools.cached_property
     def _footprints(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -187,6 +187,12 @@ def test_the_robot_respects_speed_and_acceleration_limits(world):
     assert 1.9 < np.abs(np.diff(speeds)).max() * CONTROL_HZ < 2.02
 
 
+@pytest.mark.parametrize("iterations", [0, 2.0, True])
+def test_an_impossible_count_of_solver_iterations_is_one_clear_error(iterations):
+    with pytest.raises(ValueError, match=rf"solver_iterations is {iterations}; expected a whole number from 1"):
+        World(PLAIN, RobotConfig(), solver_iterations=iterations)
+
+
 @pytest.mark.parametrize("torque", [0.1, 0.2])
 def test_a_weak_motor_accelerates_as_its_torque_allows(torque):
     """Newton: two wheels push the mass and their own inertia, a = (2 T / r) / (m + 2 I / r^2)."""

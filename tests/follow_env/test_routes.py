@@ -92,6 +92,20 @@ def test_clearance_agrees_with_an_independent_computation(scene):
 
 
 @pytest.mark.parametrize("scene", SCENES)
+def test_is_clear_decides_as_the_clearance_does(scene):
+    """Inside, outside and across the bounds, with thresholds from just above 0 to beyond a cell of the table."""
+    place, rng = make_scene(scene), np.random.default_rng(6)
+    x0, x1, y0, y1 = place.bounds
+    answers = []
+    for _ in range(2000):
+        points = rng.uniform((x0 - 0.5, y0 - 0.5), (x1 + 0.5, y1 + 0.5)) + rng.normal(0.0, 0.3, (4, 2))
+        least = float(rng.uniform(0.02, 0.7))
+        answers.append(place.is_clear(points, least))
+        assert answers[-1] == (place.clearance(points) >= least), (points, least)
+    assert 0.1 < np.mean(answers) < 0.9
+
+
+@pytest.mark.parametrize("scene", SCENES)
 def test_seeds_give_many_different_routes_of_every_kind(scene):
     routes = paper_routes(scene)
     ends = np.array([route.pose(14.0)[:2] for route in routes])

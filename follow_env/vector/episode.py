@@ -20,7 +20,7 @@ NEAREST_SEEN = 0.3
 """Persons nearer to the camera than this are not seen, m."""
 _LOW, _HIGH = BAND_DISTANCE
 
-_jit = njit(nogil=True, error_model="numpy")
+_jit = njit(nogil=True, error_model="numpy", forceinline=True)
 
 
 @_jit

@@ -67,7 +67,7 @@ def pack_place(scene: Scene, camera_height: float, chest_height: float) -> Place
     return Place(obstacles, sight, grids[0], grids[1], x_min, y_min)
 
 
-_jit = njit(nogil=True, error_model="numpy")
+_jit = njit(nogil=True, error_model="numpy", forceinline=True)
 
 
 @_jit

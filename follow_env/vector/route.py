@@ -16,7 +16,7 @@ ATTEMPTS = 1000
 _PAPER, _STANDING = ROUTE_NUMBERS["paper"], ROUTE_NUMBERS["standing"]
 _SHORTEST_TURN = math.radians(20.0)
 
-_jit = njit(nogil=True, error_model="numpy")
+_jit = njit(nogil=True, error_model="numpy", forceinline=True)
 
 
 @_jit

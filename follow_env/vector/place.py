@@ -27,8 +27,10 @@ PERSON_LOW = 0.5 * PERSON_HEIGHT - 0.5 * (PERSON_HEIGHT - 2.0 * PERSON_RADIUS - 
 FURTHEST = 0.24
 """All parts but the wheels lie in a circle of this radius around the axle's middle, m."""
 
-OBSTACLE = np.dtype([(name, np.float64) for name in ("x", "y", "length", "width", "cosine", "sine", "radius")] +
-                    [(name, np.float64) for name in ("low", "high", "reach")])
+OBSTACLE = np.dtype(
+    [(name, np.float64) for name in ("x", "y", "length", "width", "cosine", "sine", "radius")]
+    + [(name, np.float64) for name in ("low", "high", "reach")]
+)
 """An upright prism: a rectangle (half sizes) grown by `radius`, between two heights, within `reach` of (x, y); m."""
 
 
@@ -199,8 +201,11 @@ def free_sight(place, x, y, z, to_x, to_y, to_z):
 
 @_jit
 def _meets(o, x, y, z, dx, dy, dz):
-    """Whether the line from (x, y, z) to its end (dx, dy, dz) further on enters an obstacle."""
-    first, last = _slab(z - 0.5 * (o.low + o.high), dz, 0.5 * (o.high - o.low), 0.0, 1.0)
+    """Whether the line from (x, y, z) to its end (dx, dy, dz) further on enters an obstacle.
+
+    A line that begins inside does not enter, as in PyBullet's `rayTest`.
+    """
+    first, last = _slab(z - 0.5 * (o.low + o.high), dz, 0.5 * (o.high - o.low), -math.inf, 1.0)
     ox, oy = x - o.x, y - o.y
     if o.radius > 0.0:
         a, b, c = dx * dx + dy * dy, ox * dx + oy * dy, ox * ox + oy * oy - o.radius * o.radius
@@ -208,10 +213,11 @@ def _meets(o, x, y, z, dx, dy, dz):
         if root <= 0.0 or a == 0.0:
             return False
         root = math.sqrt(root)
-        return max(first, (-b - root) / a) < min(last, (-b + root) / a)
+        first, last = max(first, (-b - root) / a), min(last, (-b + root) / a)
+        return 0.0 <= first < last
     first, last = _slab(ox * o.cosine + oy * o.sine, dx * o.cosine + dy * o.sine, o.length, first, last)
     first, last = _slab(oy * o.cosine - ox * o.sine, dy * o.cosine - dx * o.sine, o.width, first, last)
-    return first < last
+    return 0.0 <= first < last
 
 
 @_jit

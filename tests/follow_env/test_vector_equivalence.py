@@ -1,0 +1,175 @@
+"""The batch against `FollowEnv`: the same episodes step by step, the same collisions and sight, the same chances."""
+
+import math
+
+import numpy as np
+import pytest
+from numba import njit
+from scipy import stats
+
+from follow_env import IDS
+from follow_env.config import RobotConfig
+from follow_env.env import FollowEnv
+from follow_env.physics import World
+from follow_env.routes import make_route
+from follow_env.scenes import make_scene
+from follow_env.vector.place import free_sight, pack_place, touches_person, touches_place
+from follow_env.vector_env import FollowVectorEnv
+
+BAD_SENSOR = {"measurement": {"outlier_share": 0.2, "miss_share": 0.1}}
+touches = njit(lambda *pose: touches_place(*pose))
+sees = njit(lambda *line: free_sight(*line))
+SCENE = pytest.mark.parametrize("scene", IDS)
+
+
+def chase(info):
+    """Return the twist, as shares of the robot's limits, that follows the truth."""
+    return np.clip(((info["distance"] - 0.6) / 1.2, 0.6 * info["bearing"]), -1.0, 1.0)
+
+
+def chase_by_wheels(info):
+    """Return the wheels' speeds, as shares of their limit, for that twist."""
+    v, omega = chase(info) * (1.2, 2.0)
+    return np.array((v - 0.15 * omega, v + 0.15 * omega)) / 1.5
+
+
+@SCENE
+@pytest.mark.parametrize(
+    ("settings", "policy"),
+    [({"obs": "measurement", "latency_s": 0.1}, chase), ({"obs": "state", "action": "wheels"}, chase_by_wheels)],
+)
+def test_the_same_episodes_come_out_step_by_step(scene, settings, policy):
+    """Routes, errors, delays, rewards, endings and every entry of info; the robot within centimetres."""
+    settings = {"scene": scene, "sensor": BAD_SENSOR, **settings}
+    seeds = [0, 7]
+    batch = FollowVectorEnv(len(seeds), **settings)
+    observations, infos = batch.reset_as_single(seeds)
+    singles = [FollowEnv(**settings) for _ in seeds]
+    starts = [single.reset(seed=seed) for single, seed in zip(singles, seeds, strict=True)]
+    assert [o.tolist() for o, _ in starts] == observations.tolist()
+    last = [info for _, info in starts]
+    valid = 0
+    for _ in range(420):
+        observations, rewards, terminated, truncated, infos = batch.step(actions := np.array([policy(i) for i in last]))
+        for i, single in enumerate(singles):
+            observation, reward, *ends, last[i] = single.step(actions[i])
+            valid += observation[2] == 1.0
+            assert observation == pytest.approx(observations[i], abs=0.04)
+            assert reward == pytest.approx(rewards[i], abs=0.03)
+            assert ends == [terminated[i], truncated[i]]
+            for key, value in last[i].items():
+                if key == "rewards":
+                    assert value == pytest.approx({name: infos[key][name][i] for name in value}, abs=0.03)
+                elif key == "collision_with":
+                    assert infos[key][i] == value
+                else:
+                    tolerance = 1e-4 if key.startswith("person") else 0.04
+                    assert np.abs(np.asarray(infos[key][i], float) - np.asarray(value, float)).max() < tolerance, key
+    assert truncated.all()
+    assert settings["obs"] == "state" or 0.5 < valid / 840 < 0.95
+    batch.close()
+    for single in singles:
+        single.close()
+
+
+@SCENE
+def test_touch_and_sight_are_those_of_pybullet(scene):
+    """At random poses beside obstacles; Bullet's own rounding decides differently within half a millimetre."""
+    place, rng, robot = pack_place(make_scene(scene), 1.0, 1.2), np.random.default_rng(0), RobotConfig()
+    world = World(make_scene(scene), robot)
+    wheel, half_track = robot.wheel_radius, 0.5 * robot.track_width
+    far, agree, touched, hidden = (90.0, 90.0, 0.0), [], 0, 0
+    for k in range(800):
+        obstacle = place.obstacles[rng.integers(len(place.obstacles))]
+        across = rng.uniform(-0.3, 0.3, 2) + rng.choice((-1.0, 1.0), 2) * (obstacle["length"], obstacle["width"])
+        x, y = obstacle["x"] + across[0] * rng.uniform(), obstacle["y"] + across[1]
+        yaw, length = rng.uniform(-3.1, 3.1), rng.uniform(0.3, 3.0)
+        world.reset((x, y, yaw), far)
+        world.simulate(1)
+        wanted = world.collision() == "wall"
+        touched += wanted
+        agree.append(touches(place, x, y, math.cos(yaw), math.sin(yaw), wheel, half_track) == wanted)
+        eye, point = (x, y, 1.0), (x + length * math.cos(yaw), y + length * math.sin(yaw), 1.2)
+        world.reset(far, (80.0, 80.0, 0.0))
+        wanted = world.line_of_sight(eye, point)
+        hidden += not wanted
+        agree.append(sees(place, *eye, *point) == wanted)
+    assert np.mean(agree) > 0.99
+    assert min(touched, hidden) > 80
+    world.close()
+
+
+def test_bumping_into_the_person_is_that_of_pybullet():
+    robot, rng = RobotConfig(), np.random.default_rng(0)
+    world = World(make_scene("corridor"), robot)
+    agree, touched = [], 0
+    for _ in range(600):
+        yaw, around, away = rng.uniform(-3.1, 3.1), rng.uniform(-3.1, 3.1), rng.uniform(0.25, 0.5)
+        person = (2.0 + away * math.cos(around), away * math.sin(around), 0.0)
+        world.reset((2.0, 0.0, yaw), person)
+        world.simulate(1)
+        wanted = world.collision() == "person"
+        touched += wanted
+        c, s = math.cos(yaw), math.sin(yaw)
+        agree.append(
+            touches_person(2.0, 0.0, c, s, person[0], person[1], robot.wheel_radius, 0.5 * robot.track_width) == wanted
+        )
+    assert np.mean(agree) > 0.99
+    assert 200 < touched < 500
+    world.close()
+
+
+@SCENE
+def test_routes_and_starts_have_the_same_chances(scene):
+    """Kolmogorov-Smirnov: where the robot starts and where, and in which direction, the person ends."""
+    place, count = make_scene(scene), 250
+    x, y, yaw = place.start
+    ends = []
+    for seed in range(count):
+        rng = np.random.default_rng(seed)
+        shift = y + float(rng.uniform(-1.0, 1.0)) * place.start_width
+        route = make_route("paper", place, (x + 1.5, shift, yaw), rng)
+        ends.append((shift, *route.pose(7.0), *route.pose(14.0)))
+    batch = FollowVectorEnv(1000, scene=scene, obs="state")
+    _, info = batch.reset(seed=0)
+    mine = [info["robot_pose"][:, 1]]
+    batch.reset(seed=0, options={"robot_pose": (-2.0, 0.0, 0.0)})
+    for step in range(1, 421):
+        *_, terminated, _, info = batch.step(np.zeros((1000, 2)))
+        assert not terminated.any()
+        if step in (210, 420):
+            mine += list(info["person_pose"].T)
+    for wanted, got in zip(np.array(ends).T, mine, strict=True):
+        assert stats.ks_2samp(wanted.round(3), got.round(3)).pvalue > 0.005
+    batch.close()
+
+
+def test_measurement_errors_have_the_same_chances():
+    """Kolmogorov-Smirnov on the errors of standing scenes, taken a second apart, with outliers and misses."""
+    settings = {"route": "standing", "sensor": BAD_SENSOR}
+    single, batch = FollowEnv(**settings), FollowVectorEnv(300, **settings)
+    stop, wanted, got = np.zeros(2), [], []
+    for seed in range(12):
+        single.reset(seed=seed)
+        for step in range(419):
+            observation, _, _, _, info = single.step(stop)
+            if step % 30 == 0:
+                wanted.append((observation[2], observation[0] - info["bearing"], observation[1] - info["distance"]))
+    batch.reset(seed=0)
+    for step in range(61):
+        observations, *_, info = batch.step(np.zeros((300, 2)))
+        if step % 30 == 0:
+            got.append(
+                np.stack(
+                    (observations[:, 2], observations[:, 0] - info["bearing"], observations[:, 1] - info["distance"]), 1
+                )
+            )
+    wanted, got = np.array(wanted), np.concatenate(got)
+    share, other = wanted[:, 0].mean(), got[:, 0].mean()
+    assert abs(share - other) < 4.0 * math.sqrt(0.09 * (1 / len(wanted) + 1 / len(got)))
+    for column in (1, 2):
+        assert stats.ks_2samp(wanted[wanted[:, 0] == 1, column], got[got[:, 0] == 1, column]).pvalue > 0.005
+    lag = np.corrcoef(got[:300, 1][got[:300, 0] == 1][:200], got[300:600, 1][got[:300, 0] == 1][:200])[0, 1]
+    assert abs(lag) < 0.25
+    single.close()
+    batch.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from pathlib import Path
 
@@ -10,13 +11,12 @@ import numpy as np
 
 from baselines.benchmark.assembly import environment_kwargs, follower
 from baselines.benchmark.cells import Cell
+from baselines.video import VideoWriter
 from follow_env.env import FollowEnv
 from follow_env.view import Dashboard
 
 CAMERA = (320, 240)
 SHEET_PICTURES = 4
-CODEC = "mp4v"
-"""MPEG-4 part 2: the one MP4 codec that every OpenCV wheel can write quickly."""
 
 
 def watch(cell: Cell, seed: int, video: Path, camera: tuple[int, int] = CAMERA) -> str:
@@ -47,8 +47,7 @@ def watch(cell: Cell, seed: int, video: Path, camera: tuple[int, int] = CAMERA) 
     policy, state = follower(cell, size), None
     observation, info = env.reset(seed=seed)
     pictures: list[np.ndarray] = []
-    writer = _Writer(video, round(1.0 / env.dt))
-    try:
+    with contextlib.closing(env), VideoWriter(video, round(1.0 / env.dt)) as writer:
         ended = False
         while True:
             action, state = policy.predict(observation, state)
@@ -62,9 +61,6 @@ def watch(cell: Cell, seed: int, video: Path, camera: tuple[int, int] = CAMERA) 
                 break
             observation, _, terminated, truncated, info = env.step(action)
             ended = terminated or truncated
-    finally:
-        writer.close()
-        env.close()
     if not cv2.imwrite(str(sheet), _contact_sheet(pictures)[:, :, ::-1]):
         raise ValueError(f"the contact sheet {sheet} cannot be written; check the folder's permissions")
     reason = "collision" if info["collision"] else "person lost" if terminated else "the route's end"
@@ -73,31 +69,6 @@ def watch(cell: Cell, seed: int, video: Path, camera: tuple[int, int] = CAMERA) 
         f"{len(pictures)} frames, {info['time']:.1f} s, ended by {reason}, success {success}\n"
         f"{video} ({video.stat().st_size / 1e6:.1f} MB) and {sheet}"
     )
-
-
-class _Writer:
-    """An MP4 file, opened with the first picture."""
-
-    def __init__(self, path: Path, rate: int) -> None:
-        self._path, self._rate = path, rate
-        self._video: cv2.VideoWriter | None = None
-
-    def write(self, image: np.ndarray) -> None:
-        """Append a picture (H, W, 3) uint8 RGB."""
-        if self._video is None:
-            self._video = self._open((image.shape[1], image.shape[0]))
-        self._video.write(image[:, :, ::-1])
-
-    def close(self) -> None:
-        """Finish the file."""
-        if self._video is not None:
-            self._video.release()
-
-    def _open(self, size: tuple[int, int]) -> cv2.VideoWriter:
-        video = cv2.VideoWriter(str(self._path), cv2.VideoWriter.fourcc(*CODEC), self._rate, size)
-        if video.isOpened():
-            return video
-        raise ValueError(f"the video {self._path} cannot be written; check the folder's permissions")
 
 
 def _contact_sheet(pictures: list[np.ndarray]) -> np.ndarray:

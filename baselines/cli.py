@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import functools
+import math
 import os
 import sys
 from collections.abc import Sequence
@@ -69,6 +71,28 @@ def _watch(parsed: argparse.Namespace) -> int:
     return 0
 
 
+def _track(parsed: argparse.Namespace) -> int:
+    from baselines.track import track
+    from tracker.recording import Recording
+
+    try:
+        recording = Recording.open(parsed.source)
+        from tracker.detection.detector import PersonDetector
+
+        detector = PersonDetector(parsed.net, parsed.weights)
+        out = parsed.out or Path("results", f"track-{parsed.source.resolve().name}")
+        print(track(recording, out, detector, parsed.target, functools.partial(print, file=sys.stderr)))
+    except ModuleNotFoundError as error:
+        print(
+            f"follow: the detector needs {error.name}; install it with pip install 'follow-env[learn]'", file=sys.stderr
+        )
+        return BAD_INPUT
+    except (ValueError, OSError) as error:
+        print(f"follow: {error}", file=sys.stderr)
+        return BAD_INPUT
+    return 0
+
+
 def _calibrate(parsed: argparse.Namespace) -> int:
     from baselines.benchmark import calibrate, calibration_report
 
@@ -114,11 +138,12 @@ _Commands: TypeAlias = "argparse._SubParsersAction[_Parser]"
 
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
-        prog="follow", description="Person following for mobile robots: reproduce, watch, calibrate, speed."
+        prog="follow", description="Person following for mobile robots: reproduce, watch, track, calibrate, speed."
     )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_reproduce(commands)
     _add_watch(commands)
+    _add_track(commands)
     _add_calibrate(commands)
     _add_speed(commands)
     return parser
@@ -169,6 +194,26 @@ def _add_watch(commands: _Commands) -> None:
     watch.set_defaults(run=_watch)
 
 
+def _add_track(commands: _Commands) -> None:
+    track = commands.add_parser(
+        "track",
+        help="track a person in recorded colour and depth pictures",
+        description="Track a person through a recording: a folder with camera.json, color/ (or rgb/) and depth/; "
+        "`tracker/recording.py` describes it.",
+    )
+    track.add_argument("source", type=Path, metavar="SOURCE", help="folder of the recording")
+    track.add_argument("--out", type=Path, metavar="DIR", help="results folder (default: results/track-SOURCE)")
+    track.add_argument("--net", default="light", help="the detector's network (default: %(default)s)")
+    track.add_argument("--weights", type=Path, metavar="FILE", help="its weights (default: the shipped ones)")
+    track.add_argument(
+        "--target",
+        type=_pixel,
+        metavar="U,V",
+        help="a picture point on the person (default: the largest, most central)",
+    )
+    track.set_defaults(run=_track)
+
+
 def _add_calibrate(commands: _Commands) -> None:
     calibrate = commands.add_parser("calibrate", help="measure the sensor's shape and fit its scale again")
     shipped = Path(__file__).parent / "calibration.json"
@@ -202,6 +247,16 @@ def _positive(text: str) -> int:
 
 def _natural(text: str) -> int:
     return _whole(text, least=0)
+
+
+def _pixel(text: str) -> tuple[float, float]:
+    try:
+        u, v = map(float, text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no picture point; expected two numbers such as 160,120"
+        ) from None
+    return u, v
 
 
 def _whole(text: str, least: int) -> int:

@@ -1,10 +1,13 @@
 """`Policy`: SB3's `predict` signature; `Follower` = perception + estimator + controller, the reference policies.
 
+`TrackingFollower` sees with paper A's tracker, which can lose the person; then it stops and looks.
+
 The estimate of a follower is part of its state, so that eq. (35) can be evaluated: `state.estimate`.
 """
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -24,18 +27,21 @@ from tracker.filters import (
     KalmanFilter,
     NoFilter,
 )
-from tracker.geometry import Intrinsics
+from tracker.geometry import CameraMount, Intrinsics
+from tracker.person_tracker import Detector, PersonTracker, Track, TrackerSettings
 from tracker.sampling import Rule, measure
 
 Percept = tuple[Pair | None, Pair]
 """A measurement (bearing rad, distance m) or None, and the odometry twist (v m/s, omega rad/s)."""
 
-OBSERVATION_OF = {"truth": "state", "emulated": "measurement", "mask": "rgbd_box"}
+OBSERVATION_OF = {"truth": "state", "emulated": "measurement", "mask": "rgbd_box", "detector": "rgbd"}
 """Perception -> the environment's observation mode that it reads."""
 ESTIMATORS = ("none", "kf", "akf", "akf_cv")
 CONTROLLERS = ("pi",)
-DEFAULT_SENSOR = {"truth": "exact", "emulated": "default", "mask": "six_smallest"}
+DEFAULT_SENSOR = {"truth": "exact", "emulated": "default", "mask": "six_smallest", "detector": "six_smallest"}
 """Sensor that a follower expects unless told otherwise: that of the environments, or the rule that reads the depth."""
+LOOK_RATE = 0.5
+"""Turning rate of a robot that looks for the person it lost, rad/s: 2 s for the width of the picture."""
 
 
 class Policy(Protocol):
@@ -119,17 +125,84 @@ class Follower:
         results = [self._step(o, None if f else s) for o, s, f in zip(batch, states, flags, strict=True)]
         return np.stack([action for action, _ in results]), [new for _, new in results]
 
-    def _step(self, observation: Any, state: FollowerState | None) -> tuple[np.ndarray, FollowerState]:
+    def _step(self, observation: Any, state: Any) -> tuple[np.ndarray, FollowerState]:
         if state is None:
             state = FollowerState(self._make_estimator(), self._make_controller())
-        state.measurement, twist = self._perceive(observation)
+        measurement, twist = self._perceive(observation)
+        return self._drive(state, measurement, twist), state
+
+    def _drive(self, state: FollowerState, measurement: Pair | None, twist: Pair) -> np.ndarray:
+        """Estimate, and return the controller's action."""
+        state.measurement = measurement
         state.estimator.predict(twist, self._dt)
-        state.estimate = state.estimator.update(state.measurement)
+        state.estimate = state.estimator.update(measurement)
         if state.estimate is None:
-            return np.zeros(2, np.float32), state
-        v, omega = state.controller.command(state.estimate.bearing, state.estimate.distance, self._dt)
+            return self._action(0.0, 0.0)
+        return self._action(*state.controller.command(state.estimate.bearing, state.estimate.distance, self._dt))
+
+    def _action(self, v: float, omega: float) -> np.ndarray:
         shares = (v / self._scale[0], omega / self._scale[1])
-        return np.array([min(max(share, -1.0), 1.0) for share in shares], np.float32), state
+        return np.array([min(max(share, -1.0), 1.0) for share in shares], np.float32)
+
+
+@dataclass(kw_only=True)
+class TrackingState(FollowerState):
+    """What a `TrackingFollower` remembers within one episode.
+
+    Attributes:
+        tracker: its memory.
+        track: of the latest frame.
+        bearing: of the person when it was tracked last, rad; None while nobody was tracked.
+    """
+
+    tracker: PersonTracker
+    track: Track | None = None
+    bearing: float | None = None
+
+
+class TrackingFollower(Follower):
+    """Follows whom a tracker tracks in `rgbd` observations.
+
+    A measurement is a position measured in that very frame, as bearing and forward distance; frames between the
+    processed ones and coasted frames have none. Until a person is confirmed the robot stands. When the tracker stops,
+    the robot halts, forgets its estimate and answers the alarm itself: it turns at `LOOK_RATE` to the side where it
+    tracked the person last, stands while somebody is being confirmed, and then follows whom the tracker confirmed, the
+    largest, most central person. It cannot know whether that is the one it lost; `state.track.confirmations` tells that
+    it was asked.
+
+    Args:
+        make_tracker: returns a fresh tracker for an episode; its rate is that of the observations.
+        make_estimator, make_controller, robot, dt: as in `Follower`.
+    """
+
+    def __init__(
+        self,
+        make_tracker: Callable[[], PersonTracker],
+        make_estimator: Callable[[], Estimator],
+        make_controller: Callable[[], Controller] = PIController.from_paper,
+        robot: RobotConfig | None = None,
+        dt: float = 1.0 / 30.0,
+    ) -> None:
+        super().__init__(perceive_odometry, make_estimator, make_controller, robot, dt)
+        self._make_tracker = make_tracker
+
+    def _step(self, observation: Any, state: Any) -> tuple[np.ndarray, FollowerState]:
+        if state is None:
+            state = TrackingState(self._make_estimator(), self._make_controller(), tracker=self._make_tracker())
+        _, twist = self._perceive(observation)
+        state.track = track = state.tracker.update(observation["rgb"], observation["depth"], twist)
+        if track.bearing is not None:
+            state.bearing = track.bearing
+            place = track.measurement
+            measurement = None if place is None else (math.atan2(place[1], place[0]), place[0])
+            return self._drive(state, measurement, twist), state
+        if track.alarm:
+            state.tracker.confirm()
+        state.estimator.reset()
+        state.controller.reset()
+        state.measurement = state.estimate = None
+        looking = state.bearing is not None and track.state != "confirming"
+        return self._action(0.0, math.copysign(LOOK_RATE, state.bearing) if looking else 0.0), state
 
 
 def perceive_state(observation: np.ndarray) -> Percept:
@@ -142,6 +215,12 @@ def perceive_measurement(observation: np.ndarray) -> Percept:
     """Read the tracker's report from a `measurement` observation; no measurement when it is not valid."""
     bearing, distance, valid, _, v, omega, _, _ = observation.tolist()
     return ((bearing, distance) if valid else None), (v, omega)
+
+
+def perceive_odometry(observation: Mapping[str, np.ndarray]) -> Percept:
+    """Read the odometry that comes with a picture; whoever looks at the picture measures."""
+    v, omega = observation["twist"].tolist()
+    return None, (v, omega)
 
 
 @dataclass(frozen=True)
@@ -165,15 +244,14 @@ class BoxPerception:
 def make_perception(
     name: str, camera: CameraConfig | None = None, robot: RobotConfig | None = None, rule: Rule = "six_smallest"
 ) -> Callable[[Any], Percept]:
-    """Return the perception `name` (a key of `OBSERVATION_OF`) for a camera on a robot."""
-    choose("perception", name, OBSERVATION_OF)
+    """Return the perception `name` for a camera on a robot: a key of `OBSERVATION_OF` that needs no memory."""
+    choose("perception", name, (known for known in OBSERVATION_OF if known != "detector"))
     if name == "truth":
         return perceive_state
     if name == "emulated":
         return perceive_measurement
     camera, robot = camera or CameraConfig(), robot or RobotConfig()
-    intrinsics = Intrinsics.from_hfov(camera.width, camera.height, math.radians(camera.hfov_deg))
-    return BoxPerception(intrinsics, robot.camera_forward, rule)
+    return BoxPerception(_intrinsics(camera), robot.camera_forward, rule)
 
 
 def make_estimator(name: str, noise: NoiseModel, alpha: float = 0.05) -> Estimator:
@@ -199,32 +277,56 @@ def make_follower(
     camera: CameraConfig | None = None,
     robot: RobotConfig | None = None,
     control_hz: int = 30,
+    detector: Detector | None = None,
 ) -> Follower:
     """Return paper B's follower, or a variant of it.
 
     Args:
         estimator: `none`, `kf`, `akf` or `akf_cv`.
-        perception: `truth`, `emulated` or `mask`; `OBSERVATION_OF` says which observation it reads.
+        perception: `truth`, `emulated`, `mask` or `detector`; `OBSERVATION_OF` says which observation it reads.
         scene: whose calibrated noise is taken when `noise` is None.
         controller: `pi`, the paper's gains.
-        noise: R and Q; by default those of the calibration for this perception and scene.
+        noise: R and Q; by default those of the calibration for this perception and scene (`detector` takes those of
+            `mask`, whose depths are read by the same rule).
         alpha: significance of the adaptive test.
         sensor: whose calibrated noise is taken; for `mask` also the rule by which depth is read from the box.
-        camera: of the `rgbd_box` observation that `mask` reads; by default the environment's default camera.
+        camera: of the pictures that `mask` and `detector` read; by default the environment's default camera.
         robot: of the environment; scales the action.
         control_hz: of the environment. Q per step is calibrated at 30 Hz and scales with the square of the period.
+        detector: finds people for `detector`; by default the shipped one, which needs PyTorch. It has no memory, so
+            episodes share it.
     """
     choose("controller", controller, CONTROLLERS)
     choose("perception", perception, OBSERVATION_OF)
     sensor = sensor or DEFAULT_SENSOR[perception]
     if noise is None:
-        noise = noise_model(perception, scene, sensor)
+        noise = noise_model("mask" if perception == "detector" else perception, scene, sensor)
         slower = (30.0 / control_hz) ** 2
         noise = replace(noise, process=(slower * noise.process[0], slower * noise.process[1]))
     make_estimator(estimator, noise, alpha)
+    if perception == "detector":
+        make_tracker = _tracker_factory(detector, camera or CameraConfig(), robot or RobotConfig(), control_hz)
+        return TrackingFollower(
+            make_tracker, lambda: make_estimator(estimator, noise, alpha), robot=robot, dt=1.0 / control_hz
+        )
     rule = cast(Rule, sensor) if perception == "mask" else "six_smallest"
     perceive = make_perception(perception, camera, robot, rule)
     return Follower(perceive, lambda: make_estimator(estimator, noise, alpha), robot=robot, dt=1.0 / control_hz)
+
+
+def _tracker_factory(
+    detector: Detector | None, camera: CameraConfig, robot: RobotConfig, rate: int
+) -> Callable[[], PersonTracker]:
+    if detector is None:
+        from tracker.detection.detector import PersonDetector
+
+        detector = PersonDetector()
+    mount = CameraMount(robot.camera_forward, robot.camera_height)
+    return functools.partial(PersonTracker, detector, _intrinsics(camera), mount, TrackerSettings.for_rate(rate))
+
+
+def _intrinsics(camera: CameraConfig) -> Intrinsics:
+    return Intrinsics.from_hfov(camera.width, camera.height, math.radians(camera.hfov_deg))
 
 
 def _split(observation: Any) -> list[Any] | None:

@@ -5,6 +5,7 @@ The video shows what the follower believes beside the truth, or, in any size, th
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 
 from baselines.benchmark.assembly import environment_kwargs, follower
 from baselines.benchmark.cells import Cell
+from baselines.video import VideoWriter
 from follow_env.camera import PinholeCamera, Renderer, make_renderer
 from follow_env.config import CameraConfig
 from follow_env.env import FollowEnv
@@ -22,8 +24,6 @@ from follow_env.view import Dashboard
 
 CAMERA = (320, 240)
 SHEET_PICTURES, SHEET_WIDTH = 4, 720
-CODEC = "mp4v"
-"""MPEG-4 part 2: the one MP4 codec that every OpenCV wheel can write quickly."""
 
 
 def watch(
@@ -70,8 +70,11 @@ def watch(
     policy, state = follower(cell, picture_size), None
     observation, info = env.reset(seed=seed)
     small: list[np.ndarray] = []
-    writer = _Writer(video, round(1.0 / env.dt))
-    try:
+    with contextlib.ExitStack() as parts:
+        writer = parts.enter_context(VideoWriter(video, round(1.0 / env.dt)))
+        for part in (env, view):
+            if part is not None:
+                parts.callback(part.close)
         ended = False
         while True:
             action, state = policy.predict(observation, state)
@@ -89,10 +92,6 @@ def watch(
                 break
             observation, _, terminated, truncated, info = env.step(action)
             ended = terminated or truncated
-    finally:
-        for part in (writer, env, view):
-            if part is not None:
-                part.close()
     if not cv2.imwrite(str(sheet), _contact_sheet(small)[:, :, ::-1]):
         raise ValueError(f"the contact sheet {sheet} cannot be written; check the folder's permissions")
     reason = "collision" if info["collision"] else "person lost" if terminated else "the route's end"
@@ -112,31 +111,6 @@ def _make_view(name: str, scene: Scene, camera: CameraConfig, size: tuple[int, i
     from follow_env.camera.opengl import OpenGLRenderer
 
     return OpenGLRenderer(scene, larger, shadows=True)
-
-
-class _Writer:
-    """An MP4 file, opened with the first picture."""
-
-    def __init__(self, path: Path, rate: int) -> None:
-        self._path, self._rate = path, rate
-        self._video: cv2.VideoWriter | None = None
-
-    def write(self, image: np.ndarray) -> None:
-        """Append a picture (H, W, 3) uint8 RGB."""
-        if self._video is None:
-            self._video = self._open((image.shape[1], image.shape[0]))
-        self._video.write(image[:, :, ::-1])
-
-    def close(self) -> None:
-        """Finish the file."""
-        if self._video is not None:
-            self._video.release()
-
-    def _open(self, size: tuple[int, int]) -> cv2.VideoWriter:
-        video = cv2.VideoWriter(str(self._path), cv2.VideoWriter.fourcc(*CODEC), self._rate, size)
-        if video.isOpened():
-            return video
-        raise ValueError(f"the video {self._path} cannot be written; check the folder's permissions")
 
 
 def _shrunk(picture: np.ndarray) -> np.ndarray:

@@ -1,0 +1,109 @@
+"""Which detection is the person that is tracked: gate and similarity of paper A, eqs. (3)-(4) and (15)-(19).
+
+The gate compares positions in space, the similarity compares boxes in the picture with the last box that was *tracked*.
+The similarity of eq. (16) is a score, not a probability; it is kept as a logarithm, so that it never underflows.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tracker.person_filter import Vector
+from tracker.sampling import Box
+
+GATE = 0.30
+"""R_thre of eq. (15), m."""
+ALPHAS = (1.0, 1.0, 0.8)
+"""alpha_0 (shift), alpha_1 (shape) and alpha_2 (aspect ratio within shape) of eq. (16)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A detection with a place in space.
+
+    Attributes:
+        box: (u0, v0, u1, v1) in the picture, px.
+        confidence: The detector's, in [0, 1]; the association does not look at it.
+        position: (x, y, z) measured, m, in the frame of the prediction.
+    """
+
+    box: Box
+    confidence: float
+    position: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Association:
+    """What was decided.
+
+    Attributes:
+        chosen: The candidate that is the person, or None.
+        distance: Between the prediction and the chosen candidate, or the nearest when none is chosen, m; None without
+            candidates.
+        log_score: Logarithm of eq. (16), at most 0; None when none is chosen.
+    """
+
+    chosen: Candidate | None
+    distance: float | None
+    log_score: float | None
+
+
+def associate(
+    candidates: Sequence[Candidate], prediction: Vector, tracked: Box, size: tuple[int, int], gate: float = GATE
+) -> Association:
+    """Return the most similar of the candidates inside the gate, eq. (4); of equals the nearest.
+
+    Args:
+        candidates: Detections of the frame that have a depth. Their positions are the raw S_k, never smoothed.
+        prediction: Predicted position of the person, m.
+        tracked: Box of the last frame in which the person was tracked, px.
+        size: Width and height of the picture, px.
+        gate: Largest distance from the prediction, m, itself included.
+    """
+    if not candidates:
+        return Association(None, None, None)
+    ranked = [(math.dist(candidate.position, prediction), candidate) for candidate in candidates]
+    inside = [
+        (log_similarity(candidate.box, tracked, size), -distance, candidate)
+        for distance, candidate in ranked
+        if distance <= gate
+    ]
+    if not inside:
+        return Association(None, min(distance for distance, _ in ranked), None)
+    score, nearness, chosen = max(inside, key=lambda entry: entry[:2])
+    return Association(chosen, -nearness, score)
+
+
+def log_similarity(box: Box, tracked: Box, size: tuple[int, int], alphas: tuple[float, float, float] = ALPHAS) -> float:
+    """Return the logarithm of eq. (16), from -inf to 0 for equal boxes.
+
+    Boxes are taken in SSD's coordinates, the picture being 1 wide and 1 high; in pixels even a perfect match would
+    score e^-72. The square root covers the area's difference alone.
+
+    Args:
+        box: Of a detection, px.
+        tracked: Of the person in the last tracked frame, px.
+        size: Width and height of the picture, px.
+        alphas: alpha_0, alpha_1 and alpha_2.
+
+    Raises:
+        ValueError: If a box is empty, inverted or not finite.
+    """
+    u, v, width, height = _normalised(box, size)
+    tracked_u, tracked_v, tracked_width, tracked_height = _normalised(tracked, size)
+    shift = math.sqrt((u - tracked_u) ** 2 + (v - tracked_v) ** 2)  # (17)
+    area = abs(width * height - tracked_width * tracked_height)  # (18)
+    aspect = abs(width / height - tracked_width / tracked_height)  # (19)
+    return -(alphas[0] * shift + alphas[1] * (math.sqrt(area) + alphas[2] * aspect))
+
+
+def _normalised(box: Box, size: tuple[int, int]) -> tuple[float, float, float, float]:
+    """Return centre, width and height as shares of the picture."""
+    u0, v0, u1, v1 = box
+    if not (-math.inf < u0 < u1 < math.inf and -math.inf < v0 < v1 < math.inf):
+        raise ValueError(
+            f"box is {box}, expected finite pixels (left, top, right, bottom) with left < right, top < bottom."
+        )
+    return (u0 + u1) / 2.0 / size[0], (v0 + v1) / 2.0 / size[1], (u1 - u0) / size[0], (v1 - v0) / size[1]

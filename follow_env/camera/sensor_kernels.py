@@ -54,7 +54,7 @@ class DepthModel(NamedTuple):
 
 
 class DepthWork(NamedTuple):
-    """Buffers: inverse depth (H, W), chance of no reading (W,), rows of W + 2 pad, bits (2, W), projector places (W,)."""
+    """Buffers: inverse depth (H, W), chance of no reading (W,), rows of W + 2 pad, bits (2, W), places seen (W,)."""
 
     inverse: np.ndarray
     lost: np.ndarray

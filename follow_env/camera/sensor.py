@@ -80,6 +80,7 @@ class RGBDSensor:
             np.empty(width, np.float32),
             np.empty((5, width + 2 * max(depth.edge_band, 1)), np.float32),
             np.empty((2, width), np.uint32),
+            np.empty(width, np.int32),
         )
         self._taps = _gaussian_taps(colour.blur * scale)
         self._gain, self._read, self._shot = (

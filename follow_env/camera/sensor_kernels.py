@@ -15,6 +15,7 @@ NORMAL_BITS, SHIFT_BITS = 12, 10
 """Axial noise takes one of 2^12 equally likely normal quantiles, the lateral jitter of each axis one of 2^10."""
 _PLACE, _FATE, _COLOUR = (np.uint32(n) for n in (0x00000000, 0x6C8E9CF5, 0xD192ED03))
 _ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
+_FINE, _BLIND = np.float32(256.0), np.float32(1e6)
 _MOST = np.float32(1e9)
 _TINY = np.float32(1e-30)
 _NEAREST = np.float32(0.01)
@@ -53,12 +54,13 @@ class DepthModel(NamedTuple):
 
 
 class DepthWork(NamedTuple):
-    """Buffers: inverse depth (H, W), the chance of no reading (W,) rows of W + 2 pad, and random bits (2, W)."""
+    """Buffers: inverse depth (H, W), chance of no reading (W,), rows of W + 2 pad, bits (2, W), places seen (W,)."""
 
     inverse: np.ndarray
     lost: np.ndarray
     rows: np.ndarray
     bits: np.ndarray
+    places: np.ndarray
 
 
 @_jit
@@ -86,7 +88,7 @@ def corrupt_depth(depth, rgb, frame, model, normal, shift, work, out):
     for i in range(height):
         _slopes(i, inverse, model, work.rows[0], work.lost)
         _darkness(i, rgb, model, work.lost)
-        _shadows(i, inverse, model, work.rows[0], work.lost)
+        _shadows(i, inverse, model, work.places, work.lost)
         _extremes(i, inverse, np.uint64(model.band), work.rows)
         _read_row(i, depth, model, normal, shift, work, out)
 
@@ -139,22 +141,22 @@ def _darkness(i, rgb, model, lost):
 
 
 @_inline
-def _shadows(i, inverse, model, line, lost):
+def _shadows(i, inverse, model, places, lost):
     """Add the chance that a pixel of row i is lost because something hides it from the projector, right of the camera.
 
     The projector sees the pixel of column u at u - f b / z; what is seen left of a pixel further right is behind it.
     """
     width = np.uint64(inverse.shape[1])
     for j in range(width):
-        line[j] = np.float32(np.int32(j)) - model.focal_baseline * inverse[i, j]
-    first = np.float32(np.inf)
+        places[j] = np.int32(_FINE * (np.float32(np.int32(j)) - min(model.focal_baseline * inverse[i, j], _BLIND)))
+    first = places[width - np.uint64(1)]
     for k in range(width):
-        j = width - np.uint64(1) - k
-        place = line[j]
-        line[j] = model.shadow if place > first else _ZERO
-        first = place if place < first else first
+        column = width - np.uint64(1) - k
+        place = places[column]
+        places[column] = np.int32(place > first)
+        first = min(place, first)
     for j in range(width):
-        lost[j] = _ONE - (_ONE - lost[j]) * (_ONE - line[j])
+        lost[j] = _ONE - (_ONE - lost[j]) * (_ONE - model.shadow * np.float32(places[j]))
 
 
 @_inline

@@ -54,9 +54,9 @@ class OpenGLRenderer:
         self._camera, self._shadows = camera, shadows
         pack = pack_scene(scene)
         self._lamps = pack.lamps if len(pack.lamps) else np.zeros((1, 4), np.float32)
-        OpenGLRenderer._process = OpenGLRenderer._process or os.getpid()
         self._require_own_process()
         self._context: Any = _make_context()
+        OpenGLRenderer._process = os.getpid()
         with self._context as context:
             context.gc_mode = "context_gc"
             context.enable_only(context.DEPTH_TEST)
@@ -109,7 +109,7 @@ class OpenGLRenderer:
         self._context = None
 
     def _require_own_process(self) -> None:
-        if self._process != os.getpid():
+        if self._process not in (None, os.getpid()):
             raise ValueError(
                 "OpenGL was used before this process was forked and cannot be used in it; start worker processes with "
                 "'spawn' or draw nothing before they start"

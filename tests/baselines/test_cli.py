@@ -60,6 +60,7 @@ def test_help_imports_nothing_heavy(arguments: list[str], tmp_path: Path) -> Non
         ([*TABLE1, "--quick"], "unrecognized arguments: --quick"),
         (["watch", "--scene", "garden"], "--scene: invalid choice: 'garden'"),
         (["watch", "--seed", "-1"], "--seed: '-1' is not a whole number of at least 0"),
+        (["watch", "--size", "1280"], "--size: '1280' is no size; expected WIDTHxHEIGHT"),
         (["watch", "--video", "nowhere/film.mp4"], "--video: 'nowhere/film.mp4' cannot be written"),
         (["calibrate", "--out", "."], "--out: '.' cannot be written"),
     ],
@@ -177,20 +178,22 @@ def test_watch_and_calibrate_get_what_was_asked_for(
     from baselines.benchmark import calibrate
 
     asked: list[object] = []
-    monkeypatch.setattr(watch, "watch", lambda *arguments: asked.append(arguments) or "a summary")
+    monkeypatch.setattr(watch, "watch", lambda *given, **also: asked.append((*given, also)) or "a summary")
     monkeypatch.setattr(calibrate, "main", lambda *arguments: asked.append(arguments) or calibration.settings())
     video, constants = tmp_path / "film.mp4", tmp_path / "constants.json"
     words = ["--estimator", "kf", "--perception", "truth", "--scene", "indoor", "--seed", "3", "--video", str(video)]
+    words += ["--renderer", "opengl", "--size", "1280x720", "--shadows"]
     assert cli.main(["watch", *words]) == 0
     assert capsys.readouterr().out == "a summary\n"
     assert cli.main(["calibrate", "--out", str(constants), "--jobs", "2"]) == 0
-    assert asked == [(Cell("truth", "indoor", "kf"), 3, video), (constants, 2)]
+    view = {"renderer": "opengl", "size": (1280, 720), "shadows": True}
+    assert asked == [(Cell("truth", "indoor", "kf"), 3, video, view), (constants, 2)]
 
 
 def test_what_watch_refuses_is_bad_input(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     from baselines import watch
 
-    def refuse(*_: object) -> str:
+    def refuse(*_: object, **__: object) -> str:
         raise ValueError("the video cannot be written; name it .mp4")
 
     monkeypatch.setattr(watch, "watch", refuse)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from baselines.policy import make_follower
-from baselines.speed.solver import circling_world
 from baselines.speed.timing import Cost, measure
 from follow_env.env import FollowEnv
+from follow_env.physics import World
 
 BARE = "8 bare physics steps"
+SPEED = 0.48
+"""Of the robot where nobody decides, m/s."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +44,8 @@ def measure_steps(scene: str, steps: int, resets: int) -> list[StepCost]:
         "step, obs=rgbd_uint8 84x84": FollowEnv(scene, obs="rgbd_uint8", camera={"width": 84, "height": 84}),
     }
     first = next(iter(envs.values()))
-    world = circling_world(first.scene)
-    operations: dict[str, Callable[[], object]] = {BARE: lambda: world.simulate(8)}
+    world = World(first.scene, first.robot_config)
+    operations: dict[str, Callable[[], object]] = {BARE: _roll(world)}
     for what, env in envs.items():
         operations[what] = _follow(env, scene) if "AKF" in what else _drive(env)
     costs = measure(operations, steps)
@@ -53,10 +56,23 @@ def measure_steps(scene: str, steps: int, resets: int) -> list[StepCost]:
     return [StepCost(scene, what, cost, costs[BARE]) for what, cost in costs.items()]
 
 
+def _roll(world: World) -> Callable[[], object]:
+    """Return a function that takes 8 physics steps straight ahead, from the start again before anything is hit."""
+    calls = itertools.cycle(range(300))
+
+    def step() -> None:
+        if next(calls) == 0:
+            world.reset((0.0, 0.0, 0.0), (8.0, 0.0, 0.0))
+            world.step(SPEED, SPEED, 240)
+        world.simulate(8)
+
+    return step
+
+
 def _drive(env: FollowEnv) -> Callable[[], object]:
     """Return a function that takes one step with a constant action, whatever happens."""
     env.reset(seed=0)
-    action = np.array((0.4, 0.0), np.float32)
+    action = np.array((SPEED / env.robot_config.max_speed, 0.0), np.float32)
 
     def step() -> None:
         _, _, terminated, truncated, _ = env.step(action)

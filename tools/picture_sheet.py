@@ -1,4 +1,4 @@
-"""Draw docs/people.png: every body, the postures, both scenes and the robot's view at four distances.
+"""Draw docs/people.png (bodies, postures, the robot's view) and docs/scenes.png (places, lights, primitives).
 
 Run from the repository's root: `python tools/picture_sheet.py`.
 """
@@ -15,50 +15,131 @@ from follow_env.config import CameraConfig
 from follow_env.person.bodies import BODIES, load_body
 from follow_env.person.postures import POSTURES
 from follow_env.person.walker import Walker
-from follow_env.scenes import make_scene
+from follow_env.scene import Box, Capsule, Cylinder, Light, Material, Scene, Sphere
+from follow_env.scenes import LIGHTS, SCENES, make_scene
 
-SIZE = (240, 180)
+CAMERA = PinholeCamera(CameraConfig(width=240, height=180, supersample=2))
 EYE = CameraPose(4.0, 0.0, 1.0, 0.0)
+AHEAD, ACROSS = CameraPose(1.0, 0.0, 1.0, 0.0), CameraPose(9.5, -1.2, 1.4, 2.7)
+DEPTH_RANGE = 8.0
 INK, PAPER = (40, 40, 40), 255
+ID_COLOURS = np.array(((225, 225, 225), (230, 159, 0), (0, 114, 178)), np.uint8)
+"""Okabe-Ito: scene grey, the person to follow orange, others blue."""
 
 
-def main(out: Path) -> None:
-    """Write the sheet to `out`."""
-    camera = PinholeCamera(CameraConfig(width=SIZE[0], height=SIZE[1]))
-    renderers = {
-        name: make_renderer(name="raster", scene=make_scene(name), camera=camera) for name in ("corridor", "indoor")
-    }
+def main(folder: Path) -> None:
+    """Write both sheets into `folder`."""
+    for name, rows in (("people.png", people_sheet()), ("scenes.png", scenes_sheet())):
+        widest = max(map(len, rows))
+        blank = np.full_like(rows[0][0], PAPER)
+        sheet = np.vstack([np.hstack(row + [blank] * (widest - len(row))) for row in rows])
+        cv2.imwrite(str(folder / name), sheet[:, :, ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
-    def shot(
-        scene: str, body: str, outfit: str, distance: float, turn: float = 0.3, posture: str = "walk"
-    ) -> RGBDFrame:
-        walker = Walker(load_body(body, outfit))
-        return renderers[scene].render(EYE, (walker.place(EYE.x + distance, 0.0, turn, 0.45, 0.9, posture),))
 
+def people_sheet() -> list[list[np.ndarray]]:
+    """Every body, the postures, and people at four distances from the robot."""
     worn = dict(zip(BODIES, ("blue", "green", "orange", "red", "white", "checks", "stripes"), strict=True))
-    rows = [
-        [tile(shot("indoor", body, outfit, 2.6, math.pi - 0.5).rgb, body) for body, outfit in worn.items()],
-        [tile(shot("indoor", "man", "orange", 2.6, 2.2, name).rgb, name) for name in POSTURES],
-        [tile(shot("corridor", "woman", "stripes", d).rgb, f"corridor, {d:g} m") for d in (1.0, 1.5, 2.5, 4.0)]
-        + [tile(shot("indoor", "man_tall", "checks", d).rgb, f"indoor, {d:g} m") for d in (1.5, 2.5, 4.0)],
+    places = {name: make_scene(name) for name in SCENES}
+    views = (("corridor", "woman", "stripes", 1.0), ("corridor", "woman", "stripes", 1.5))
+    views += (("corridor", "woman", "stripes", 2.5), ("corridor", "woman", "stripes", 4.0))
+    views += (("indoor", "man_tall", "checks", 1.5), ("indoor", "man_tall", "checks", 2.5))
+    views += (("indoor", "man_tall", "checks", 4.0),)
+    frame = shot(places["indoor"], EYE, person(EYE, 1.5, "woman_slim", "green"))
+    return [
+        [
+            tile(shot(places["indoor"], EYE, person(EYE, 2.6, body, outfit, math.pi - 0.5)).rgb, body)
+            for body, outfit in worn.items()
+        ],
+        [
+            tile(shot(places["indoor"], EYE, person(EYE, 2.6, "man", "orange", 2.2, posture)).rgb, posture)
+            for posture in POSTURES
+        ],
+        [
+            tile(shot(places[name], EYE, person(EYE, distance, body, outfit)).rgb, f"{name}, {distance:g} m")
+            for name, body, outfit, distance in views
+        ],
+        [tile(frame.rgb, "colour"), depth_tile(frame), id_tile(frame)],
     ]
-    frame = shot("indoor", "woman_slim", "green", 1.5)
-    share = np.clip(frame.depth / 8.0, 0.0, 1.0)
-    depth = cv2.applyColorMap((255.0 * (1.0 - share)).astype(np.uint8), cv2.COLORMAP_VIRIDIS)[:, :, ::-1]
-    ids = np.repeat((frame.ids * 255)[:, :, None], 3, axis=2)
-    rows.append([tile(frame.rgb, "colour"), tile(depth, "depth, 0 (yellow) to 8 m"), tile(ids, "id of the person")])
-    widest = max(map(len, rows))
-    blank = np.full_like(rows[0][0], PAPER)
-    sheet = np.vstack([np.hstack(row + [blank] * (widest - len(row))) for row in rows])
-    cv2.imwrite(str(out), sheet[:, :, ::-1])
+
+
+def scenes_sheet() -> list[list[np.ndarray]]:
+    """Both places in each light from two viewpoints with depth and ids, the robot's view, and the primitives."""
+    rows = []
+    for name in SCENES:
+        for label, eye, distance, turn in (("along", AHEAD, 2.5, 0.3), ("across", ACROSS, 3.0, -1.0)):
+            frames = {
+                light: shot(make_scene(name, light), eye, person(eye, distance, "man", "orange", turn))
+                for light in LIGHTS
+            }
+            row = [tile(frame.rgb, f"{name}, {label}, {light}") for light, frame in frames.items()]
+            rows.append([*row, depth_tile(frames["normal"]), id_tile(frames["normal"])])
+    for name in SCENES:
+        place = make_scene(name)
+        frames = {d: shot(place, EYE, person(EYE, d, "woman", "blue")) for d in (1.0, 1.5, 2.5, 4.0)}
+        rows.append([tile(frame.rgb, f"{name}, robot's view at {d:g} m") for d, frame in frames.items()])
+    eye = CameraPose(0.0, 0.0, 1.0, 0.0)
+    frame = shot(primitives(), eye, person(eye, 2.6, "child", "green", 2.6))
+    rows.append([tile(frame.rgb, "box, cylinder, sphere, capsule"), depth_tile(frame), id_tile(frame)])
+    return rows
+
+
+def primitives() -> Scene:
+    """A small place with one of each primitive, in front of a wall."""
+    wall = Material((0.86, 0.84, 0.78))
+    parts = (
+        Box((4.5, 0.0, 1.6), (0.1, 9.0, 3.2), wall),
+        Box((3.4, 1.3, 0.4), (0.6, 0.6, 0.8), Material((0.62, 0.44, 0.27), texture="wood"), 0.5),
+        Cylinder((3.2, 0.55, 0.45), 0.22, 0.9, Material((0.66, 0.45, 0.36), texture="brick")),
+        Sphere((2.5, -0.5, 0.75), 0.25, Material((0.0, 0.45, 0.70))),
+        Capsule((3.3, -1.2, 0.75), 0.25, 1.5, Material((0.80, 0.47, 0.65))),
+    )
+    lamps = (Light((1.0, 1.5, 2.6), 0.9), Light((3.0, -1.5, 2.6), 0.6))
+    return Scene("primitives", parts, Material((0.62, 0.62, 0.60), 0.4, "tiles"), lamps, 0.3, (-2.0, 4.5, -4.5, 4.5))
+
+
+def person(eye: CameraPose, distance: float, body: str, outfit: str, turn: float = 0.3, posture: str = "walk") -> tuple:
+    """Return the person who stands so far ahead of `eye`, m, turned by `turn` (rad) from its direction."""
+    x, y = eye.x + distance * math.cos(eye.yaw), eye.y + distance * math.sin(eye.yaw)
+    return (Walker(load_body(body, outfit)).place(x, y, eye.yaw + turn, 0.45, 0.9, posture),)
+
+
+def shot(place: Scene, eye: CameraPose, people: tuple) -> RGBDFrame:
+    """Return the frame that `eye` sees."""
+    return make_renderer("raster", place, CAMERA).render(eye, people)
+
+
+def depth_tile(frame: RGBDFrame) -> np.ndarray:
+    """Return the depth in colours, with the bar that explains them in its head."""
+    share = np.clip(frame.depth / DEPTH_RANGE, 0.0, 1.0)
+    picture = tile(viridis(1.0 - share), "depth")
+    left, right = 80, CAMERA.width - 42
+    picture[5:17, left:right] = viridis(np.linspace(1.0, 0.0, right - left)[None, :])
+    text(picture, "0", left - 12)
+    text(picture, f"{DEPTH_RANGE:g} m", right + 5)
+    return picture
+
+
+def viridis(share: np.ndarray) -> np.ndarray:
+    """Return the colours (H, W, 3) of shares (H, W) in [0, 1]."""
+    return cv2.applyColorMap((255.0 * share).astype(np.uint8), cv2.COLORMAP_VIRIDIS)[:, :, ::-1]
+
+
+def id_tile(frame: RGBDFrame) -> np.ndarray:
+    """Return the ids in colours."""
+    return tile(ID_COLOURS[frame.ids], "ids: orange = the person")
 
 
 def tile(picture: np.ndarray, label: str) -> np.ndarray:
     """Return the picture with its label above, uint8 (H, W, 3)."""
     head = np.full((22, picture.shape[1], 3), PAPER, np.uint8)
-    cv2.putText(head, label, (4, 15), cv2.FONT_HERSHEY_SIMPLEX, 0.42, INK, 1, cv2.LINE_AA)
+    text(head, label, 4)
     return np.pad(np.vstack((head, picture)), ((0, 4), (0, 4), (0, 0)), constant_values=PAPER)
 
 
+def text(picture: np.ndarray, label: str, left: int) -> None:
+    """Write into the picture's head."""
+    cv2.putText(picture, label, (left, 15), cv2.FONT_HERSHEY_SIMPLEX, 0.42, INK, 1, cv2.LINE_AA)
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/people.png"))
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "docs"))

@@ -19,7 +19,8 @@ def find_triangles(view, people, scene, work):
     """Fill `work.triangles` with the triangles of people that may be seen; return how many, or -1 if one is not finite.
 
     A triangle turned away, or that meets no pixel centre, is left out. Vertices are lit here, once each, and the light
-    is interpolated over the triangle in perspective.
+    A triangle that meets no pixel centre is left out, and so is one turned away, unless an open border is near: then
+    its back is drawn. Vertices are lit here, once each, and the light is interpolated over the triangle in perspective.
     """
     near = view.near
     vertices, faces, anchors = people.vertices, people.faces, people.anchors
@@ -65,9 +66,10 @@ def find_triangles(view, people, scene, work):
             edge(bx, by, bz, ax, ay, az, records, count, 0)
             edge(cx, cy, cz, bx, by, bz, records, count, 3)
             edge(ax, ay, az, cx, cy, cz, records, count, 6)
-            _interpolate(i, j, k, volume, lit, records, count)
+            inverse = 1.0 / volume
+            _interpolate(i, j, k, inverse, lit, records, count)
             if pattern[f]:
-                _interpolate_anchors(i, j, k, volume, anchors, records, count)
+                _interpolate_anchors(i, j, k, inverse, anchors, records, count)
             count += 1
     return count
 
@@ -110,18 +112,18 @@ def _pixels(low, high, first, step, size, place, row, column):
 
 
 @_jit
-def _interpolate(i, j, k, volume, light, records, row):
+def _interpolate(i, j, k, inverse, light, records, row):
     """Write the planes of 1/Z and light/Z: the edge opposite to a corner, over the volume, is its share over Z."""
     for m in range(3):
-        a, b, c = records[row, 3 + m] / volume, records[row, 6 + m] / volume, records[row, m] / volume
+        a, b, c = inverse * records[row, 3 + m], inverse * records[row, 6 + m], inverse * records[row, m]
         records[row, 9 + m] = (a + b) + c
         records[row, 12 + m] = (a * light[i] + b * light[j]) + c * light[k]
 
 
 @_jit
-def _interpolate_anchors(i, j, k, volume, anchors, records, row):
+def _interpolate_anchors(i, j, k, inverse, anchors, records, row):
     """Write the planes of the three anchor coordinates over Z."""
     for m in range(3):
-        a, b, c = records[row, 3 + m] / volume, records[row, 6 + m] / volume, records[row, m] / volume
+        a, b, c = inverse * records[row, 3 + m], inverse * records[row, 6 + m], inverse * records[row, m]
         for n in range(3):
             records[row, 15 + 3 * n + m] = (a * anchors[i, n] + b * anchors[j, n]) + c * anchors[k, n]

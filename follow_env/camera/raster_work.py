@@ -35,7 +35,10 @@ class View(NamedTuple):
 
 
 class PeoplePack(NamedTuple):
-    """All people of a picture as one mesh; `starts` (P + 1, 2) are the first vertex and face of each."""
+    """All people of a picture as one mesh; `starts` (P + 1, 2) are the first vertex and face of each.
+
+    `borders` (F,) are the faces that are drawn from both sides, see `Mesh.near_border`.
+    """
 
     vertices: np.ndarray
     normals: np.ndarray

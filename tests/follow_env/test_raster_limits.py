@@ -1,5 +1,6 @@
 """The default camera at its limits: inside solids, empty places, any picture size, bad input, long runs."""
 
+import dataclasses
 import math
 import resource
 from pathlib import Path
@@ -71,17 +72,23 @@ def test_a_scene_without_primitives_is_floor_and_nothing():
 @pytest.mark.parametrize("size", [(1, 1), (1, 50), (33, 16), (17, 1)])
 def test_pictures_of_any_size(size):
     camera, pose = PinholeCamera(CameraConfig(width=size[0], height=size[1])), CameraPose(0.03, 0.1, 0.9, 0.05)
-    frame = RasterRenderer(make_scene("corridor"), camera).render(pose)
+    corridor = make_scene("corridor")
+    solids = Sphere((2.0, 0.1, 1.0), 0.3, RED), Capsule((3.0, 0.2, 1.0), 0.5, 1.8, RED)
+    place = dataclasses.replace(corridor, primitives=(*corridor.primitives, *solids))
+    frame = RasterRenderer(place, camera).render(pose)
     assert (frame.rgb.shape, frame.depth.shape, frame.ids.shape) == ((*size[::-1], 3), size[::-1], size[::-1])
     assert (frame.rgb.dtype, frame.depth.dtype, frame.ids.dtype) == (np.uint8, np.float32, np.uint8)
-    assert frame.depth == pytest.approx(reference(make_scene("corridor"), camera, pose)[0], rel=1e-4)
+    assert frame.depth == pytest.approx(reference(place, camera, pose)[0], rel=1e-4)
     assert frame.rgb.max() > 50
 
 
 def test_the_largest_picture():
-    """4096 x 4096: the wall ahead and the floor have their depths to the last row."""
-    camera = PinholeCamera(CameraConfig(width=4096, height=4096))
-    frame = RasterRenderer(make_scene("corridor"), camera).render(CameraPose(0.0, 0.0, 1.0, 0.0))
+    """4096 x 4096: the wall ahead, the floor and a sphere have their depths to the last row."""
+    camera, corridor = PinholeCamera(CameraConfig(width=4096, height=4096)), make_scene("corridor")
+    place = dataclasses.replace(corridor, primitives=(*corridor.primitives, Sphere((3.0, 1.0, 1.0), 0.2, RED)))
+    frame = RasterRenderer(place, camera).render(CameraPose(0.0, 0.0, 1.0, 0.0))
+    middle = frame.depth[2048, round(2048 - camera.focal / 3.0)]  # the ray to the centre, sqrt(10) m away
+    assert middle == pytest.approx(3.0 * (1.0 - 0.2 / math.sqrt(10.0)), abs=1e-3)
     assert frame.depth[2048, 2048] == pytest.approx(19.96, abs=1e-4)
     rows = np.arange(2400, 4096)
     assert frame.depth[rows, 2048] == pytest.approx(camera.focal / (rows + 0.5 - 2048.0), rel=1e-5)

@@ -102,7 +102,7 @@ def test_switching_vector_units_off_changes_numpy():
 
 
 def test_the_path_of_an_episode_computes_no_vectorised_transcendentals():
-    """They and BLAS may differ in their last bits between machines, this one or not; pictures for people may use them.
+    """They and BLAS may differ in their last bits between machines; pictures for people and OpenGL's may use them.
 
     `math` and the exactly rounded operations (among them the square root) are the same everywhere.
     """
@@ -111,7 +111,7 @@ def test_the_path_of_an_episode_computes_no_vectorised_transcendentals():
         "log", "log2", "log10", "log1p", "power", "hypot", "dot", "matmul", "inner", "vdot", "einsum", "linalg",
     }  # fmt: skip
     package, found = Path(follow_env.__file__).parent, []
-    files = [file for file in sorted(package.rglob("*.py")) if file.name != "view.py"]
+    files = [file for file in sorted(package.rglob("*.py")) if file.name != "view.py" and "opengl" not in file.name]
     assert len(files) > 10
     for file in files:
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):

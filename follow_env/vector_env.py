@@ -2,8 +2,10 @@
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import gymnasium
@@ -15,15 +17,17 @@ from gymnasium.vector.utils import batch_space
 from follow_env.camera.raster_kernels import announced
 from follow_env.config import RobotConfig, choose
 from follow_env.env import FollowEnv, _pose
+from follow_env.person.bodies import load_body
 from follow_env.reward import SET_POINT, reward_terms
 from follow_env.routes import ROUTES, Route, make_route
 from follow_env.vector.episode import CHEST_HEIGHT
 from follow_env.vector.kernels import BEGIN, SKIP, STEP, play
 from follow_env.vector.philox import keys
+from follow_env.vector.pictures import Artist, Pictures, near_bytes
 from follow_env.vector.place import pack_place
 from follow_env.vector.records import COLLISIONS, INFO, MOST_TURNS, ROUTE_NUMBERS, WORLD, pack_settings
 
-OBSERVATIONS = ("measurement", "state")
+OBSERVATIONS = ("measurement", "state", "rgbd", "rgbd_uint8")
 WORLDS_PER_THREAD = 512
 """A thread is worth its while from this many worlds."""
 _TERMS = tuple(reward_terms(0.0, SET_POINT, True, 0.0, False))
@@ -62,11 +66,11 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         threads: int | None = None,
         **settings: Any,
     ) -> None:
-        for name, value in (("num_envs", num_envs), ("threads", threads)):
+        for what, value in (("num_envs", num_envs), ("threads", threads)):
             if value is not None and (type(value) is not int or value < 1):
-                raise ValueError(f"{name} is {value!r}; expected a whole number from 1")
-        mode = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
-        mode = AutoresetMode(choose("autoreset_mode", mode, [m.value for m in AutoresetMode]))
+                raise ValueError(f"{what} is {value!r}; expected a whole number from 1")
+        name = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
+        mode = AutoresetMode(choose("autoreset_mode", name, [m.value for m in AutoresetMode]))
         single = FollowEnv(**settings)
         _check_batchable(single, settings)
         self.num_envs, self._mode, self._single = num_envs, mode, single
@@ -79,14 +83,25 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         self._worlds = np.zeros(num_envs, WORLD)
         self._queues = np.zeros((num_envs, single._delay, 3))
         self._tapes = np.zeros((1, 1, 6))
-        self._observations = np.zeros((num_envs, 8), np.float32)
+        self._observations = np.zeros((num_envs, 0 if self._settings["pictures"][0] else 8), np.float32)
         self._done = np.zeros(num_envs, bool)
         self._started = False
-        parts = min(threads or len(os.sched_getaffinity(0)), max(num_envs // WORLDS_PER_THREAD, 1))
-        self._edges = [num_envs * k // parts for k in range(parts + 1)]
-        self._pool = ThreadPoolExecutor(parts - 1) if parts > 1 else None
+        threads = threads or len(os.sched_getaffinity(0))
+        self._ranges = _shares(num_envs, min(threads, max(num_envs // WORLDS_PER_THREAD, 1)))
+        self._pictures: Pictures | None = None
+        self._artists: list[Artist] = []
         with announced():
             self._play(0, 0, np.zeros(num_envs, np.int8), np.zeros((num_envs, 2)), *self._outcome())
+            if self._settings["pictures"][0]:
+                self._picture_ranges = _shares(num_envs, min(threads, num_envs))
+                self._pictures = Pictures(num_envs, single.camera, single._delay)
+                body = load_body(*single._dressed)
+                for _ in self._picture_ranges:
+                    artist = Artist(single.scene, single.camera, single.robot_config, single._sensor.depth, body)
+                    artist.draw(self._worlds[0])  # compiles what it needs, before threads meet there
+                    self._artists.append(artist)
+        most = max(len(self._ranges), len(self._artists))
+        self._pool = ThreadPoolExecutor(most - 1) if most > 1 else None
 
     def reset(
         self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
@@ -154,15 +169,15 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
                 f"the episode of world {i} has ended; reset it with options={{'reset_mask': terminated | truncated}}"
             )
         outcome = self._outcome()
-        self._run(todo, commands, *outcome)
         observations, infos, rewards, terminated, truncated = outcome
+        self._run(todo, commands, *outcome)
         self._done = terminated | truncated
         final: dict[str, Any] = {}
         if self._mode is AutoresetMode.SAME_STEP and self._done.any():
-            final = self._finals(observations, infos)
+            final = self._finals(*self._observed(observations.copy(), infos.copy(), self._done.copy()))
             self._run(np.where(self._done, BEGIN, SKIP).astype(np.int8), commands, *outcome)
-        self._observations = observations.copy()
-        return observations, rewards, terminated, truncated, {**_report(infos, np.ones(self.num_envs, bool)), **final}
+        observation, info = self._observed(observations, infos, np.ones(self.num_envs, bool))
+        return observation, rewards, terminated, truncated, {**info, **final}
 
     def close_extras(self, **kwargs: Any) -> None:
         """Stop the threads."""
@@ -175,25 +190,43 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         if not chosen.all():
             observations[:], infos[:] = self._observations, np.zeros(1, INFO)
         self._run(np.where(chosen, BEGIN, SKIP).astype(np.int8), np.zeros((self.num_envs, 2)), *outcome)
-        self._observations = observations.copy()
         self._done = self._done & ~chosen
-        return observations, _report(infos, chosen)
+        return self._observed(observations, infos, chosen)
+
+    def _observed(self, observations: np.ndarray, infos: np.ndarray, mask: np.ndarray) -> tuple[Any, dict[str, Any]]:
+        """Return the observation and Gymnasium's vector form of info, valid for the worlds of the mask."""
+        info = _report(infos, mask)
+        if self._pictures is None:
+            self._observations = observations.copy()
+            return observations, info
+        rgb, depth = self._pictures.observed(self._worlds)
+        if self._single._obs == "rgbd_uint8":
+            info |= {"depth": depth, "_depth": mask}
+            return np.concatenate((rgb, near_bytes(depth)[..., None]), axis=-1), info
+        return {"rgb": rgb, "depth": depth, "twist": infos["twist"].astype(np.float32)}, info
 
     def _outcome(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return fresh arrays for observations, infos, rewards, terminated and truncated."""
         n = self.num_envs
-        return np.empty((n, 8), np.float32), np.empty(n, INFO), np.zeros(n), np.zeros(n, bool), np.zeros(n, bool)
+        ends = np.zeros(n, bool), np.zeros(n, bool)
+        return np.empty_like(self._observations), np.empty(n, INFO), np.zeros(n), *ends
 
     def _run(self, todo: np.ndarray, *arrays: np.ndarray) -> None:
-        """Let the threads play all worlds."""
-        ranges = list(zip(self._edges[:-1], self._edges[1:], strict=True))
-        others = [self._pool.submit(self._play, *ends, todo, *arrays) for ends in ranges[1:]] if self._pool else []
-        failures = self._play(*ranges[0], todo, *arrays) + sum(other.result() for other in others)
+        """Let the threads play all worlds, then draw them."""
+        failures = sum(self._share([partial(self._play, *ends, todo, *arrays) for ends in self._ranges]))
         if failures:
             raise ValueError(
                 f"no route of 12 m with turns of 20-50 deg fits the scene {self._single.scene.name!r} in {failures} "
                 "worlds; widen its free lane"
             )
+        if self._pictures is not None:
+            drawers = zip(self._picture_ranges, self._artists, strict=True)
+            self._share([partial(self._pictures.take, *ends, todo, self._worlds, artist) for ends, artist in drawers])
+
+    def _share(self, jobs: list[Callable[[], Any]]) -> list[Any]:
+        """Do the jobs, the first in this thread, and return what they return."""
+        others = [self._pool.submit(job) for job in jobs[1:]] if self._pool is not None else []
+        return [jobs[0](), *(other.result() for other in others)]
 
     def _play(self, first: int, last: int, todo: np.ndarray, actions: np.ndarray, *outcome: np.ndarray) -> int:
         given = (todo, self._worlds, self._queues, self._tapes, self._settings, self._place, actions)
@@ -255,18 +288,20 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
                 turn.angle,
             )
 
-    def _finals(self, observations: np.ndarray, infos: np.ndarray) -> dict[str, Any]:
+    def _finals(self, observation: Any, info: dict[str, Any]) -> dict[str, Any]:
         """Return `final_obs` and `final_info` of the worlds that are done, as Gymnasium's `SAME_STEP` wants them."""
         last = np.full(self.num_envs, None, object)
+        parts = isinstance(observation, dict)
         for i in np.flatnonzero(self._done):
-            last[i] = observations[i].copy()
+            last[i] = {key: value[i] for key, value in observation.items()} if parts else observation[i]
         mask = self._done.copy()
-        return {
-            "final_obs": last,
-            "_final_obs": mask,
-            "final_info": _report(infos.copy(), mask),
-            "_final_info": mask,
-        }
+        return {"final_obs": last, "_final_obs": mask, "final_info": info, "_final_info": mask}
+
+
+def _shares(count: int, parts: int) -> list[tuple[int, int]]:
+    """Return the ends of `parts` ranges that cover 0 <= i < count."""
+    edges = [count * k // parts for k in range(parts + 1)]
+    return list(pairwise(edges))
 
 
 def _check_batchable(single: FollowEnv, settings: dict[str, Any]) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -122,11 +123,11 @@ def _tracking(column: str, scale: float, rows: Sequence[Row]) -> PooledError:
     return PooledError(steps, np.zeros(len(rows)), steps * rms * rms)
 
 
-_POOLS = {
-    "bearing estimate (rad)": lambda rows: PooledError.of(rows, "angle"),
-    "distance estimate (cm)": lambda rows: PooledError.of(rows, "distance"),
-    "bearing kept (rad)": lambda rows: _tracking("angle_tracking_rmse_rad", 1.0, rows),
-    "distance kept (cm)": lambda rows: _tracking("distance_tracking_rmse_m", 100.0, rows),
+_POOLS: dict[str, Callable[[Sequence[Row]], PooledError]] = {
+    "bearing estimate (rad)": partial(PooledError.of, quantity="angle"),
+    "distance estimate (cm)": partial(PooledError.of, quantity="distance"),
+    "bearing kept (rad)": partial(_tracking, "angle_tracking_rmse_rad", 1.0),
+    "distance kept (cm)": partial(_tracking, "distance_tracking_rmse_m", 100.0),
 }
 
 

@@ -49,7 +49,7 @@ def chain(
                 )
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def skin(
     rest: np.ndarray,
     bones: np.ndarray,
@@ -104,7 +104,7 @@ def skin(
         vertices[v, 2] = sz
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def smooth_normals(vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray) -> None:
     """Write unit normals (V, 3) float32: the mean of the faces around a vertex, weighted by their area."""
     normals[:] = 0.0

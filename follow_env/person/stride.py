@@ -179,7 +179,7 @@ def _aim(start: np.ndarray, end: np.ndarray, hinge: np.ndarray, rest: np.ndarray
     multiply(frame, rest.T, out)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def pose_gait(
     phase: float,
     amplitude: float,

@@ -10,9 +10,9 @@ from follow_env.env import HALF_TRUNK, LOST_AFTER, MAX_DISTANCE
 from follow_env.physics import PERSON_RADIUS
 from follow_env.reward import BAND_BEARING, BAND_DISTANCE, SET_POINT, SUCCESS_BAND_SHARE, SUCCESS_OUT_OF_VIEW
 from follow_env.vector.drive import limit, roll
-from follow_env.vector.philox import NOISE, OUTLIER, START, normals, uniforms
+from follow_env.vector.philox import NOISE, OUTLIER, PICTURE, START, normals, uniforms, words
 from follow_env.vector.place import free_sight, touches_person, touches_place
-from follow_env.vector.route import advance_person, draw_route, heading_at, velocity
+from follow_env.vector.route import advance_person, draw_route, heading_at, speed_at, velocity, walked_at
 
 CHEST_HEIGHT = 1.2
 """Height at which the person is looked for, m."""
@@ -122,6 +122,11 @@ def _look(world, settings, place):
     world.longest_out_of_view = max(world.longest_out_of_view, world.out_of_view)
     if _LOW <= world.distance <= _HIGH and abs(world.bearing) <= BAND_BEARING:
         world.in_band += 1
+    if settings.pictures:
+        t = world.steps * settings.dt
+        world.walked, world.speed = walked_at(world, t), speed_at(world, t)
+        high, low, _, _ = words(world, world.steps, 0, PICTURE)
+        world.picture_seed = high << np.uint64(32) | low
 
 
 @_jit

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-NOISE, OUTLIER, START, ROUTE, DEPTH = range(5)
+NOISE, OUTLIER, START, ROUTE, PICTURE = range(5)
 """What numbers are for: the last word of the counter."""
 
 _MULTIPLIERS = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))

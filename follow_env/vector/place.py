@@ -107,7 +107,7 @@ def nearer_than(place, x, y, radius):
     least, most = _bounds(place.distance, place, x, y)
     if least >= radius or most < radius:
         return most < radius
-    for k in range(len(place.obstacles)):
+    for k in range(len(place.obstacles)):  # noqa: SIM110  numba inlines no generators
         if gap(place.obstacles[k], x, y) < radius:
             return True
     return False
@@ -129,9 +129,9 @@ def touches_place(place, x, y, cosine, sine, wheel_radius, half_track):
                 return True
         if gap(o, x + CASTER_MIDDLE * cosine, y + CASTER_MIDDLE * sine) < _ball(CASTER_RADIUS, o.low, o.high):
             return True
-        if o.low < MAST_HIGH and o.high > MAST_LOW:
-            if gap(o, x + MAST_MIDDLE * cosine, y + MAST_MIDDLE * sine) < MAST_RADIUS:
-                return True
+        beside_mast = o.low < MAST_HIGH and o.high > MAST_LOW
+        if beside_mast and gap(o, x + MAST_MIDDLE * cosine, y + MAST_MIDDLE * sine) < MAST_RADIUS:
+            return True
         if o.low < CHASSIS_HIGH and o.high > CHASSIS_LOW and _chassis_overlaps(o, x, y, cosine, sine):
             return True
     return False

@@ -27,12 +27,13 @@ def _reals(*names: str) -> list[tuple[str, type]]:
 WORLD = np.dtype(
     [
         ("key", np.uint64),  # of the world's random numbers
+        ("picture_seed", np.uint64),  # of the errors of this moment's picture
         *((name, np.int64) for name in ("episode", "steps", "route", "turns", "collision")),
         *((name, np.int64) for name in ("out_of_view", "longest_out_of_view", "in_band")),
         *_reals("x", "y", "yaw", "cosine", "sine"),  # robot
         *_reals("left", "right", "command_left", "command_right"),  # rim speeds, m/s
         *_reals("v", "omega", "first", "second"),  # odometry and last action
-        *_reals("person_x", "person_y", "heading", "person_vx", "person_vy"),
+        *_reals("person_x", "person_y", "heading", "person_vx", "person_vy", "walked", "speed"),
         *_reals("route_heading", "distance_total", "duration", "ramp"),
         ("turn_start", np.float64, MOST_TURNS),
         ("turn_duration", np.float64, MOST_TURNS),
@@ -66,6 +67,7 @@ SETTINGS = np.dtype(
     [
         ("observe_state", np.bool_),
         ("measure", np.bool_),
+        ("pictures", np.bool_),
         ("wheel_actions", np.bool_),
         *((name, np.int64) for name in ("route", "substeps", "person_substeps", "delay")),
         *_reals("dt", "decay", "start_x", "start_y", "start_yaw", "start_width"),
@@ -92,6 +94,7 @@ def pack_settings(env: "FollowEnv") -> np.ndarray:
     values = {
         "observe_state": env._obs == "state",
         "measure": env._obs == "measurement",
+        "pictures": env._obs.startswith("rgbd"),
         "wheel_actions": env._action == "wheels",
         "route": ROUTE_NUMBERS[env._route_name],
         "substeps": env._substeps,

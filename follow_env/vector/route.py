@@ -80,7 +80,7 @@ def _path_is_free(world, place):
     """Whether every third point of the route's table keeps the clearance."""
     x, y = world.person_x, world.person_y
     vx, vy = velocity(world, 0.0)
-    for i in range(int(math.ceil(DURATION / TABLE_STEP)) + 1):
+    for i in range(math.ceil(DURATION / TABLE_STEP) + 1):
         if i % 3 == 0 and nearer_than(place, x, y, CLEARANCE):
             return False
         x, y, vx, vy = _walk(world, x, y, vx, vy, i * TABLE_STEP, TABLE_STEP)
@@ -137,6 +137,19 @@ def speed_at(world, t):
     if edge >= world.ramp:
         return cruise
     return cruise * 0.5 * (1.0 - math.cos(math.pi * edge / world.ramp))
+
+
+@_jit
+def walked_at(world, t):
+    """Return the distance walked until time t, m: `Route.walked`."""
+    t = min(max(t, 0.0), world.duration)
+    edge = min(t, world.duration - t)
+    cruise = world.distance_total / (world.duration - world.ramp)
+    if edge >= world.ramp:
+        way = cruise * (edge - 0.5 * world.ramp)
+    else:
+        way = cruise * 0.5 * (edge - world.ramp / math.pi * math.sin(math.pi * edge / world.ramp))
+    return way if edge == t else world.distance_total - way
 
 
 @_jit

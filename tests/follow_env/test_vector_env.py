@@ -158,7 +158,7 @@ def test_without_autoreset_the_mask_starts_the_chosen_worlds(make):
     env = make(3, autoreset_mode=AutoresetMode.DISABLED)
     env.reset(seed=0, options=CRASH)
     for _ in range(40):
-        observation, _, terminated, truncated, _ = env.step(np.ones((3, 2)) * (1.0, 0.0))
+        observation, _, terminated, _, _ = env.step(np.ones((3, 2)) * (1.0, 0.0))
         if terminated.any():
             break
     with pytest.raises(gymnasium.error.ResetNeeded, match="world 0 has ended"):
@@ -218,3 +218,29 @@ def test_impossible_calls_are_refused_in_one_sentence(make):
         env.reset(options={"robot_poses": (0, 0, 0)})
     with pytest.raises(ValueError, match="expected three finite numbers"):
         env.reset(options={"robot_pose": (0.0, np.nan, 0.0)})
+
+
+def test_pictures_depend_on_the_worlds_seed_only_and_begin_anew_with_the_episode(make):
+    """Also with latency: the first picture of an episode stands until it is old enough."""
+    settings = {"obs": "rgbd_uint8", "camera": {"width": 32, "height": 24}, "latency_s": 1 / 15}
+    one, many = make(2, threads=1, **settings), make(5, threads=3, autoreset_mode="SameStep", **settings)
+    pose = {"robot_pose": (1.0, 1.2, 1.5)}
+    first, _ = one.reset(seed=3, options=pose)
+    assert (many.reset(seed=3, options=pose)[0][:2] == first).all()
+    for _ in range(40):
+        mine, *_ = one.step(np.ones((2, 2)) * (1.0, 0.0))
+        theirs, _, terminated, _, info = many.step(np.ones((5, 2)) * (1.0, 0.0))
+        if terminated.any():
+            break
+        assert (mine == theirs[:2]).all()
+    assert terminated.all()
+    assert (np.stack(list(info["final_obs"]))[:2] == mine).all()
+    assert info["final_info"]["depth"].shape == (5, 24, 32)
+    begun, *_ = one.step(np.zeros((2, 2)))
+    assert (begun == theirs[:2]).all()
+    assert (begun != mine).mean() > 0.1
+    for _ in range(2):
+        again, *_ = one.step(np.zeros((2, 2)))
+        assert (again == begun).all()
+    again, *_ = one.step(np.zeros((2, 2)))
+    assert (again != begun).any()

@@ -79,7 +79,7 @@ def test_touch_and_sight_are_those_of_pybullet(scene):
     world = World(make_scene(scene), robot)
     wheel, half_track = robot.wheel_radius, 0.5 * robot.track_width
     far, agree, touched, hidden = (90.0, 90.0, 0.0), [], 0, 0
-    for k in range(800):
+    for _ in range(800):
         obstacle = place.obstacles[rng.integers(len(place.obstacles))]
         across = rng.uniform(-0.3, 0.3, 2) + rng.choice((-1.0, 1.0), 2) * (obstacle["length"], obstacle["width"])
         x, y = obstacle["x"] + across[0] * rng.uniform(), obstacle["y"] + across[1]
@@ -173,3 +173,34 @@ def test_measurement_errors_have_the_same_chances():
     assert abs(lag) < 0.25
     single.close()
     batch.close()
+
+
+SMALL = {"width": 40, "height": 30}
+
+
+@SCENE
+@pytest.mark.parametrize("obs", ["rgbd", "rgbd_uint8"])
+def test_the_same_pictures_come_out(scene, obs):
+    """With an exact sensor, pixel by pixel at the start, and nearly everywhere while the robots are a little apart."""
+    settings = {"scene": scene, "obs": obs, "camera": SMALL, "sensor": "ideal", "outfit": "red", "latency_s": 1 / 15}
+    batch, single = FollowVectorEnv(3, threads=2, **settings), FollowEnv(**settings)
+    observations, infos = batch.reset_as_single([0, 1, 2])
+    assert batch.observation_space.contains(observations)
+    wanted, info = single.reset(seed=1)
+    for step in range(40):
+        depth = observations["depth"][1] if obs == "rgbd" else infos["depth"][1]
+        true_depth = wanted["depth"] if obs == "rgbd" else info["depth"]
+        rgb = (observations["rgb"] if obs == "rgbd" else observations)[1].astype(int)
+        true_rgb = (wanted["rgb"] if obs == "rgbd" else wanted).astype(int)
+        if step == 0:
+            assert (depth == true_depth).all()
+            assert (rgb == true_rgb).all()
+        assert np.mean(np.abs(depth - true_depth) > 0.05) < 0.02
+        assert np.mean(np.abs(rgb - true_rgb) > 20) < 0.03
+        action = chase(info)
+        wanted, _, _, _, info = single.step(action)
+        observations, _, _, _, infos = batch.step(np.tile(action, (3, 1)))
+        if obs == "rgbd":
+            assert observations["twist"][1] == pytest.approx(wanted["twist"], abs=0.02)
+    batch.close()
+    single.close()

@@ -1,0 +1,1 @@
+"""The person detector of paper A: priors, networks, loss, data from our own renderer, training and evaluation."""

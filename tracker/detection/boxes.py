@@ -1,0 +1,72 @@
+"""Boxes in a picture: `Detection`, overlap and non-maximum suppression. Needs no torch.
+
+A box is (u0, v0, u1, v1): left, upper, right and lower edge; u to the right, v down, in px or any other one unit.
+"""
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """A person that was detected.
+
+    Attributes:
+        box: (u0, v0, u1, v1), px.
+        score: confidence in [0, 1].
+    """
+
+    box: Box
+    score: float
+
+
+def iou(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the overlap (N, M) of boxes (N, 4) with boxes (M, 4): intersection over union, 0 where the union is."""
+    a, b = np.asarray(first)[:, None, :], np.asarray(second)[None, :, :]
+    width = np.minimum(a[..., 2], b[..., 2]) - np.maximum(a[..., 0], b[..., 0])
+    height = np.minimum(a[..., 3], b[..., 3]) - np.maximum(a[..., 1], b[..., 1])
+    shared = np.maximum(width, 0.0) * np.maximum(height, 0.0)
+    union = area(a) + area(b) - shared
+    return np.divide(shared, union, out=np.zeros_like(shared), where=union > 0.0)
+
+
+def area(boxes: np.ndarray) -> np.ndarray:
+    """Return the areas (...) of boxes (..., 4)."""
+    return (boxes[..., 2] - boxes[..., 0]) * (boxes[..., 3] - boxes[..., 1])
+
+
+def nms(boxes: np.ndarray, scores: np.ndarray, overlap: float = 0.45) -> np.ndarray:
+    """Return the indices (K,) of the boxes that remain, best first: none overlaps a better one by more than `overlap`.
+
+    Args:
+        boxes: (N, 4).
+        scores: (N,); among equals the first is the better.
+        overlap: greatest intersection over union of two that remain (SSD: 0.45).
+    """
+    order = np.argsort(-scores, kind="stable")
+    return order[_suppress(np.ascontiguousarray(boxes[order], dtype=np.float64), overlap)]
+
+
+@numba.njit(cache=True)
+def _suppress(boxes: np.ndarray, overlap: float) -> np.ndarray:
+    """Return which of the sorted boxes remain, (N,) bool."""
+    count = len(boxes)
+    remains = np.ones(count, np.bool_)
+    for i in range(count):
+        if not remains[i]:
+            continue
+        u0, v0, u1, v1 = boxes[i]
+        size = (u1 - u0) * (v1 - v0)
+        for j in range(i + 1, count):
+            width = min(u1, boxes[j, 2]) - max(u0, boxes[j, 0])
+            height = min(v1, boxes[j, 3]) - max(v0, boxes[j, 1])
+            if width > 0.0 and height > 0.0:
+                shared = width * height
+                other = (boxes[j, 2] - boxes[j, 0]) * (boxes[j, 3] - boxes[j, 1])
+                if shared > overlap * (size + other - shared):
+                    remains[j] = False
+    return remains

@@ -66,7 +66,9 @@ class DataConfig:
         if not 1 <= self.people <= 8:
             raise ValueError(f"people is {self.people}; expected 1 to 8 in a picture")
         if not 0.5 <= self.nearest <= self.farthest <= 20.0:
-            raise ValueError(f"people stand from {self.nearest} to {self.farthest} m; expected 0.5 <= nearest <= farthest <= 20")
+            raise ValueError(
+                f"people stand from {self.nearest} to {self.farthest} m; expected 0.5 <= nearest <= farthest <= 20"
+            )
         if self.pictures_per_scene < 1 or self.zoom < 1.0:
             raise ValueError(
                 f"pictures_per_scene, zoom are {self.pictures_per_scene}, {self.zoom}; expected at least 1 each"

@@ -43,10 +43,12 @@ class PersonDetector:
                     f"make some with `follow detector train --net {net}` and name the file"
                 )
         torch.set_num_threads(threads)
-        self.network = load_network(net, weights).to(memory_format=torch.channels_last)
+        self.network = load_network(net, weights)
         self._priors = prior_boxes(self.network.config.layers)
 
-    def detect(self, rgb: np.ndarray, depth: np.ndarray | None = None, confidence: float = CONFIDENCE) -> list[Detection]:
+    def detect(
+        self, rgb: np.ndarray, depth: np.ndarray | None = None, confidence: float = CONFIDENCE
+    ) -> list[Detection]:
         """Return the people in a picture, the most certain first; boxes in px of that picture, cut at its edge.
 
         Args:

@@ -62,7 +62,8 @@ def evaluate(network: MultiBoxNet, source: SampleSource, pictures: int, batch: i
 def score(found: Sequence[Sequence[Detection]], truths: Sequence[Truth]) -> Score:
     """Return the score of the detections of some pictures, each in descending order, against the people in them."""
     people = sum(int((~truth.difficult).sum()) for truth in truths)
-    scores, hits = [np.zeros(0)], [np.zeros(0, np.int64)]
+    scores: list[np.ndarray] = [np.zeros(0)]
+    hits: list[np.ndarray] = [np.zeros(0, np.int64)]
     for detections, truth in zip(found, truths, strict=True):
         scores.append(np.array([d.score for d in detections]))
         hits.append(assign(np.array([d.box for d in detections]).reshape(-1, 4), truth))

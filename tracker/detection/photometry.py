@@ -25,7 +25,7 @@ def disturb(rgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         rgb = np.clip(rgb + sigma * noise, 0.0, 255.0).astype(np.uint8)
     if rng.random() < 0.1:
         _, packed = cv2.imencode(".jpg", rgb, (cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(25, 90))))
-        rgb = cv2.imdecode(packed, cv2.IMREAD_COLOR)
+        rgb = np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR))
     return rgb
 
 

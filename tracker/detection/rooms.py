@@ -1,4 +1,4 @@
-"""Rooms that nobody designed: sizes, colours, textures, furniture and lamps by chance, so that a detector learns people.
+"""Rooms that nobody designed: size, colours, textures, furniture and lamps by chance, so that a detector learns people.
 
 The shipped scenes get other light and other colours; a room of chance has everything by chance.
 """

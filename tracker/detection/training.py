@@ -1,7 +1,7 @@
 """Training: pictures made while they are needed, one cosine cycle of AdamW, and an average of the weights to keep.
 
-Written to the folder: `config.json`, `log.csv`, `evaluation.csv`, `curves.png`, `weights.safetensors` (the average, what
-`PersonDetector` reads) and `state.pt`, from which a run goes on to the same weights that it would have had.
+A run writes `config.json`, `log.csv`, `evaluation.csv`, `curves.png`, `weights.safetensors` (the average, what
+`PersonDetector` reads) and `state.pt`, from which it goes on to the weights that it would have had without a break.
 """
 
 import csv
@@ -110,8 +110,8 @@ class _Run:
         self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
         torch.manual_seed(config.seed)
         fresh = make_network(config.net) if config.start is None else load_network(config.net, Path(config.start))
-        self.network = fresh.train().to(self.device, memory_format=torch.channels_last)
-        self.averaged = make_network(config.net).to(self.device, memory_format=torch.channels_last)
+        self.network = fresh.train().to(self.device)
+        self.averaged = make_network(config.net).to(self.device)
         self.averaged.load_state_dict(self.network.state_dict())
         kernels = [p for p in self.network.parameters() if p.ndim > 1]
         others = [p for p in self.network.parameters() if p.ndim <= 1]
@@ -147,6 +147,7 @@ class _Run:
             sampler=range(self.step, self.config.steps),
             num_workers=self.workers,
             worker_init_fn=_use_one_thread,
+            multiprocessing_context="spawn" if self.workers else None,  # a fork would copy locked thread pools
         )
         yield from loader
 
@@ -155,12 +156,12 @@ class _Run:
             group["lr"] = self._rate(self.step)
         inputs = to_tensor(pictures.to(self.device, non_blocking=True))
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.device.type == "cuda"):
-            said = self.network(inputs)
-        loss = multibox_loss(*(part.float() for part in said), labels.to(self.device), offsets.to(self.device))
+            logits, coded = self.network(inputs)
+        loss = multibox_loss(logits.float(), coded.float(), labels.to(self.device), offsets.to(self.device))
         if not torch.isfinite(loss.total):
             raise FloatingPointError(f"the loss is {float(loss.total)} at step {self.step}; lower the rate")
         self.optimiser.zero_grad(set_to_none=True)
-        loss.total.backward()
+        loss.total.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.config.clip)
         self.optimiser.step()
         keep = min(self.config.average, (1 + self.step) / (10 + self.step))

@@ -9,14 +9,7 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
-from tracker.detection.networks import NETS, MultiBoxNet, NetConfig, make_network
-
-FORMAT = "follow-env person detector 1"
-
-
-def fingerprint(config: NetConfig) -> str:
-    """Return twelve hexadecimal digits that change with anything the network is made of."""
-    return hashlib.sha256(json.dumps(dataclasses.asdict(config), sort_keys=True).encode()).hexdigest()[:12]
+from tracker.detection.networks import MultiBoxNet, NetConfig, make_network
 
 
 def save_weights(network: MultiBoxNet, path: Path) -> None:
@@ -26,8 +19,7 @@ def save_weights(network: MultiBoxNet, path: Path) -> None:
         for name, tensor in network.state_dict().items()
         if tensor.is_floating_point()  # the counters of batch normalisation are of no use here
     }
-    config = network.config
-    save_file(state, path, {"format": FORMAT, "net": config.name, "config": fingerprint(config)})
+    save_file(state, path, {"made": _made(network.config)})
 
 
 def load_network(name: str, path: Path) -> MultiBoxNet:
@@ -39,23 +31,26 @@ def load_network(name: str, path: Path) -> MultiBoxNet:
     """
     network = make_network(name)
     if not path.is_file():
-        raise FileNotFoundError(f"the weights {str(path)!r} do not exist; name a file that `follow detector train` wrote")
+        raise FileNotFoundError(
+            f"the weights {str(path)!r} do not exist; name a file that `follow detector train` wrote"
+        )
     try:
         with safe_open(path, "pt") as file:
-            said = file.metadata() or {}
+            made = (file.metadata() or {}).get("made", "nothing of ours")
             state = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
     except SafetensorError as error:
         raise ValueError(f"{str(path)!r} holds no weights ({error}); expected a safetensors file") from error
-    if said.get("format") != FORMAT or said.get("net") != name:
+    if made != _made(network.config):
         raise ValueError(
-            f"{str(path)!r} holds weights of the net {said.get('net')!r} (format {said.get('format')!r}); "
-            f"expected {name!r} ({FORMAT!r}): choose the net that it names"
-        )
-    if said.get("config") != fingerprint(NETS[name]):
-        raise ValueError(
-            f"{str(path)!r} was trained for a net {name!r} of another make ({said.get('config')}, now "
-            f"{fingerprint(NETS[name])}); train it again with `follow detector train --net {name}`"
+            f"{str(path)!r} holds {made}; expected {_made(network.config)}: choose the net that it names, or "
+            f"train again with `follow detector train --net {name}`"
         )
     counters = {key: value for key, value in network.state_dict().items() if not value.is_floating_point()}
     network.load_state_dict({key: value.float() for key, value in state.items()} | counters)
     return network.eval()
+
+
+def _made(config: NetConfig) -> str:
+    """Return a sentence that changes with the network's name and with anything it is made of."""
+    make = hashlib.sha256(json.dumps(dataclasses.asdict(config), sort_keys=True).encode()).hexdigest()[:12]
+    return f"weights of the net {config.name!r}, make {make}"

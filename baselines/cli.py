@@ -125,6 +125,21 @@ def _speed(parsed: argparse.Namespace) -> int:
     return 0
 
 
+def _detector(parsed: argparse.Namespace) -> int:
+    try:
+        from tracker.detection import commands
+
+        text = getattr(commands, parsed.action)(parsed)
+    except ModuleNotFoundError as error:
+        print(f"follow: {error.name} is missing; `pip install follow-env[learn]` brings it", file=sys.stderr)
+        return FAILED
+    except (ValueError, OSError) as error:
+        print(f"follow: {error}", file=sys.stderr)
+        return BAD_INPUT
+    print(text)
+    return 0
+
+
 class _Parser(argparse.ArgumentParser):
     """A parser whose complaint is one sentence, without the usage before it."""
 
@@ -145,6 +160,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_track(commands)
     _add_calibrate(commands)
     _add_speed(commands)
+    _add_detector(commands)
     return parser
 
 
@@ -232,6 +248,38 @@ def _add_speed(commands: _Commands) -> None:
     speed.add_argument("--quick", action="store_true", help="take a tenth of the samples")
     speed.add_argument("--out", type=Path, metavar="DIR", help="also write speed.md and speed.json into this folder")
     speed.set_defaults(run=_speed)
+
+
+def _add_detector(commands: _Commands) -> None:
+    detector = commands.add_parser("detector", help="train the person detector, evaluate it, look at its pictures")
+    actions = detector.add_subparsers(metavar="ACTION", required=True)
+    train = actions.add_parser("train", help="train on pictures made from a seed, and keep the run in a folder")
+    train.add_argument("--steps", type=_positive, default=2500, metavar="N", help="batches (default: %(default)s)")
+    train.add_argument("--seed", type=_natural, default=0, metavar="S", help="default: %(default)s")
+    train.add_argument("--start", type=Path, metavar="FILE", help="weights to start from instead of random ones")
+    train.add_argument("--out", type=Path, metavar="DIR", help="folder of the run (default: results/detector-NET)")
+    train.add_argument("--resume", action="store_true", help="go on with the run that the folder holds")
+    _add_jobs(train)
+    evaluate = actions.add_parser("evaluate", help="average precision, and the counts of paper A's Table 2")
+    evaluate.add_argument("--weights", type=Path, metavar="FILE", help="of the net (default: the shipped ones)")
+    evaluate.add_argument(
+        "--pictures", type=_positive, default=500, metavar="N", help="held-out pictures (default: %(default)s)"
+    )
+    evaluate.add_argument(
+        "--frames", type=_positive, metavar="N", help="of each sequence of Table 2 (default: as many as the paper's)"
+    )
+    for action in (train, evaluate):
+        action.add_argument(
+            "--net",
+            choices=("light", "light_depth", "light_ssd", "paper", "ssd300"),
+            default="light",
+            help="default: %(default)s",
+        )
+    preview = actions.add_parser("preview", help="draw a sheet of training pictures with their boxes")
+    preview.add_argument("--seed", type=_natural, default=0, metavar="S", help="default: %(default)s")
+    preview.add_argument("--out", type=_output_file, default=Path("detector_preview.png"), metavar="FILE")
+    for name, action in actions.choices.items():
+        action.set_defaults(run=_detector, action=name)
 
 
 def _add_jobs(command: argparse.ArgumentParser) -> None:

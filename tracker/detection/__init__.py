@@ -1,1 +1,1 @@
-"""Finding people in pictures."""
+"""The person detector of paper A: priors, networks, loss, data from our own renderer, training and evaluation."""

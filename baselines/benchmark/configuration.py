@@ -18,7 +18,6 @@ from baselines.benchmark import metrics
 from baselines.benchmark.cells import ENVIRONMENT_IDS, Cell, family_cells, rule_cells, sensitivity_cells, table1_cells
 from follow_env.config import CameraConfig, RobotConfig, SensorConfig
 
-FILE_NAME = "config.json"
 EPISODES = {"truth": 100, "emulated": 100, "mask": 20}
 """Episodes per cell of Table 1 unless told otherwise, by perception: a rendered episode costs far more."""
 

@@ -99,10 +99,12 @@ class Agent:
         """
         single = 3 if self.card.observation == "rgbd_uint8" else 1
         if isinstance(observation, Mapping) or np.ndim(observation) not in (single, single + 1):
-            shape = f"a mapping with {', '.join(observation)}" if isinstance(observation, Mapping) else np.shape(observation)
-            raise ValueError(
-                f"the agent {self.name} got {shape}; it drives with obs={self.observation!r}"
+            shape = (
+                f"a mapping with {', '.join(observation)}"
+                if isinstance(observation, Mapping)
+                else np.shape(observation)
             )
+            raise ValueError(f"the agent {self.name} got {shape}; it drives with obs={self.observation!r}")
         if np.ndim(observation) == single:
             starts = state is None or (episode_start is not None and bool(np.any(episode_start)))
             return self._step(observation, None if starts else state)
@@ -153,7 +155,9 @@ def load_agent(name: str | Path, scene: str = "corridor", control_hz: int = 30) 
     if path.suffix != SUFFIX:
         path = _folder() / f"{choose('agent', str(name), shipped())}{SUFFIX}"
     if not path.is_file():
-        raise ValueError(f"{path} is not a file; expected the {SUFFIX} file of an agent, or one of {', '.join(shipped())}")
+        raise ValueError(
+            f"{path} is not a file; expected the {SUFFIX} file of an agent, or one of {', '.join(shipped())}"
+        )
     try:
         with safe_open(path, "numpy") as file:
             header = file.metadata() or {}

@@ -72,7 +72,9 @@ def make_model(recipe: Recipe, worlds: VecEnv, seed: int, log_dir: str | None = 
 
 def load_model(recipe: Recipe, path: str, worlds: VecEnv) -> BaseAlgorithm:
     """Return the model of a checkpoint that `train` wrote on this machine."""
-    algorithm = SAC if isinstance(recipe, SACRecipe) else RecurrentPPO if isinstance(recipe, RecurrentPPORecipe) else PPO
+    algorithm = (
+        SAC if isinstance(recipe, SACRecipe) else RecurrentPPO if isinstance(recipe, RecurrentPPORecipe) else PPO
+    )
     return algorithm.load(path, worlds, device="cpu")
 
 

@@ -12,4 +12,9 @@ IDS = {"corridor": "follow_env/Corridor-v0", "indoor": "follow_env/Indoor-v0"}
 """Scene name -> environment id."""
 
 for _scene, _id in IDS.items():
-    register(_id, entry_point="follow_env.env:FollowEnv", kwargs={"scene": _scene})
+    register(
+        _id,
+        entry_point="follow_env.env:FollowEnv",
+        vector_entry_point="follow_env.vector_env:FollowVectorEnv",
+        kwargs={"scene": _scene},
+    )

@@ -1,0 +1,1 @@
+"""The kinematic engine of `FollowVectorEnv`: worlds as records, compiled by numba."""

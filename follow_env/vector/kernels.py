@@ -1,0 +1,72 @@
+# mypy: disable-error-code="no-untyped-def"
+"""The compiled entry: `play` begins or steps a range of worlds. Worlds share nothing, so ranges may run in threads."""
+
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+from numba import njit
+
+from follow_env.vector.episode import begin, observe, report, step
+
+SKIP, BEGIN, STEP = range(3)
+"""What `play` does with a world."""
+
+
+def _digest() -> int:
+    """Return a checksum of the sources that `play` is compiled from: numba's cache looks at this file only."""
+    here = Path(__file__).parent
+    sources = [*here.glob("*.py"), *(here.parent / f"{name}.py" for name in ("env", "physics", "reward", "routes"))]
+    digest = 0
+    for path in sorted(sources):
+        digest = zlib.crc32(path.read_bytes(), digest)
+    return digest
+
+
+def _compiled(sources: int) -> Callable[..., int]:
+    @njit(cache=True, nogil=True, error_model="numpy")
+    def play(
+        first, last, todo, worlds, queues, tapes, settings, place, actions, observations, infos, rewards, ended, cut
+    ):
+        """Begin or step the worlds first <= i < last; return how many found no route.
+
+        Args:
+            first: of the range.
+            last: of the range, exclusive.
+            todo: (n,) int8, `SKIP`, `BEGIN` or `STEP` for each world.
+            worlds: (n,) `records.WORLD`.
+            queues: (n, delay, 3) float64, delayed measurements.
+            tapes: (n, steps, 6) float64, given draws of the measurement's errors; (1, 1, 6) if no world has one.
+            settings: (1,) `records.SETTINGS`.
+            place: `Place`.
+            actions: (n, 2) float64.
+            observations: (n, 8) float32, out; (n, 0) if pictures are observed.
+            infos: (n,) `records.INFO`, out.
+            rewards: (n,) float64, out where a world steps.
+            ended: (n,) bool, terminated, out where a world steps.
+            cut: (n,) bool, truncated, out where a world steps.
+        """
+        key = sources  # noqa: F841  captured, hence part of the cache key
+        shared = settings[0]
+        failures = 0
+        for i in range(first, last):
+            if todo[i] == SKIP:
+                continue
+            world, info = worlds[i], infos[i]
+            if todo[i] == BEGIN:
+                if not begin(world, shared, place):
+                    failures += 1
+                info.rewards[:] = 0.0
+            else:
+                terms = info.rewards
+                ended[i], cut[i] = step(world, shared, place, actions[i, 0], actions[i, 1], terms)
+                rewards[i] = (((terms[0] + terms[1]) + terms[2]) + terms[3]) + terms[4]
+            if observations.shape[1] > 0:
+                observe(world, shared, queues[i], tapes[i % tapes.shape[0]], observations[i])
+            report(world, shared, info)
+        return failures
+
+    return play
+
+
+play = _compiled(_digest())

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from baselines.calibration import Pair
+from baselines.policy import Policy
 from follow_env.config import RobotConfig
 from follow_env.reward import SET_POINT
 from tracker.filters import Estimate
@@ -72,3 +74,7 @@ class Oracle:
         v = ahead + omega * y + self._gain * (distance - SET_POINT)
         shares = (v / self._robot.max_speed, omega / self._robot.max_yaw_rate)
         return np.array([min(max(share, -1.0), 1.0) for share in shares], np.float32), NoState()
+
+
+FLOORS: dict[str, Callable[[], Policy]] = {"parked": Parked, "random": Random, "oracle": Oracle}
+"""Name -> policy."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from baselines.benchmark.assembly import environment_kwargs, follower
+from baselines.benchmark.assembly import driver, environment_kwargs
 from baselines.benchmark.cells import Cell
 from follow_env.env import FollowEnv
 from follow_env.view import Dashboard
@@ -44,7 +44,7 @@ def watch(cell: Cell, seed: int, video: Path, camera: tuple[int, int] = CAMERA) 
         env.robot_config.camera_forward,
         f"{cell.scene}, {cell.perception}, {cell.estimator} + PI",
     )
-    policy, state = follower(cell, size), None
+    policy, state = driver(cell, size), None
     observation, info = env.reset(seed=seed)
     pictures: list[np.ndarray] = []
     writer = _Writer(video, round(1.0 / env.dt))

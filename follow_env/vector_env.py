@@ -232,7 +232,9 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         if np.ndim(poses) == 1:
             poses = [poses] * self.num_envs
         if len(poses) != self.num_envs:
-            raise ValueError(f"{len(poses)} robot poses for {self.num_envs} worlds; expected one for each world, or one")
+            raise ValueError(
+                f"{len(poses)} robot poses for {self.num_envs} worlds; expected one for each world, or one"
+            )
         for i in np.flatnonzero(chosen):
             world = self._worlds[i]
             world["x"], world["y"], world["yaw"] = _pose(poses[i])

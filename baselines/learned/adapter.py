@@ -6,6 +6,7 @@ world: the batches write into one array, and the infos of worlds that go on are 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -48,7 +49,7 @@ class FollowVecEnv(VecEnv):
         self._batches = list(batches)
         self._filters = list(filters) if filters is not None else [None] * len(batches)
         edges = np.cumsum([0, *(batch.num_envs for batch in batches)])
-        self._parts = [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        self._parts = [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
         super().__init__(int(edges[-1]), batches[0].single_observation_space, batches[0].single_action_space)
         space = self.observation_space
         assert space.shape is not None

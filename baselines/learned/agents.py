@@ -1,4 +1,4 @@
-"""Shipped and freshly trained agents: weights in safetensors (no code is executed to load them), driven without torch."""
+"""Learned followers without torch: weights in safetensors, so no code is executed to load an agent."""
 
 from __future__ import annotations
 
@@ -151,9 +151,7 @@ def load_agent(name: str | Path, scene: str = "corridor", control_hz: int = 30) 
     """
     from safetensors import SafetensorError, safe_open
 
-    path = Path(name)
-    if path.suffix != SUFFIX:
-        path = _folder() / f"{choose('agent', str(name), shipped())}{SUFFIX}"
+    path = Path(name) if Path(name).suffix == SUFFIX else weights_file(str(name))
     if not path.is_file():
         raise ValueError(
             f"{path} is not a file; expected the {SUFFIX} file of an agent, or one of {', '.join(shipped())}"
@@ -177,6 +175,11 @@ def load_agent(name: str | Path, scene: str = "corridor", control_hz: int = 30) 
 def shipped() -> list[str]:
     """Names of the agents that come with the package."""
     return sorted(path.name.removesuffix(SUFFIX) for path in _folder().glob(f"*{SUFFIX}"))
+
+
+def weights_file(name: str) -> Path:
+    """Return the weights file of a shipped agent; a ValueError names the nearest when there is none."""
+    return _folder() / f"{choose('agent', name, shipped())}{SUFFIX}"
 
 
 def _folder() -> Path:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from baselines.benchmark.assembly import PICTURE
 from baselines.benchmark.cells import SCENES, Cell
 from baselines.benchmark.episodes import play
 from baselines.learned.agents import Agent
-from baselines.learned.recipes import PICTURE
 from follow_env.env import FollowEnv
 
 HELD_SEEDS = range(20_000, 20_005)
@@ -30,9 +30,12 @@ def evaluate(agent: Agent, seeds: Iterable[int]) -> dict[str, float]:
     def mean(values: Iterable[float]) -> float:
         return math.fsum(values) / len(rows)
 
+    def values(column: str) -> list[float]:
+        return [float(str(row[column])) for row in rows]
+
     return {
-        "success": mean(float(row["success"]) for row in rows),
-        **{key: math.sqrt(mean(float(row[key]) ** 2 for row in rows)) for key in SCORES[1:3]},
+        "success": mean(values("success")),
+        **{key: math.sqrt(mean(value * value for value in values(key))) for key in SCORES[1:3]},
         "collisions": mean(row["ended"] == "collision" for row in rows),
         "losses": mean(row["ended"] == "lost" for row in rows),
     }

@@ -87,6 +87,7 @@ def policy_arrays(model: BaseAlgorithm) -> tuple[dict[str, np.ndarray], str, boo
     arrays: dict[str, torch.Tensor] = {}
     if isinstance(extractor, Picture):
         for i, layer in enumerate(module for module in extractor.layers if isinstance(module, nn.Conv2d)):
+            assert layer.bias is not None
             arrays |= {f"conv.{i}.weight": layer.weight, f"conv.{i}.bias": layer.bias}
             arrays[f"conv.{i}.stride"] = torch.tensor([float(layer.stride[0])])
     else:

@@ -67,7 +67,7 @@ class Network:
             values = np.ascontiguousarray(observation.transpose(2, 0, 1), np.float64) / 255.0
             for weight, bias, stride in self._conv:
                 values = _convolve(values, weight, bias, stride)
-            features = values.ravel()
+            features: np.ndarray = values.ravel()
         else:
             offset, scale = self._input  # type: ignore[misc]
             features = np.clip((observation.astype(np.float64) - offset) * scale, -CLIP, CLIP)

@@ -14,7 +14,6 @@ ENVIRONMENT = "follow_env/*-v0"
 """The environments' version that agents are trained for."""
 OBSERVATIONS = ("measurement", "estimate", "rgbd_uint8")
 """What an agent sees: the tracker's report, the adaptive Kalman filter's estimate of it, or the picture."""
-PICTURE = {"width": 84, "height": 84}
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import configure
 
 import follow_env
+from baselines.benchmark.assembly import PICTURE
 from baselines.benchmark.cells import ENVIRONMENT_IDS
 from baselines.benchmark.configuration import machine, packages
 from baselines.benchmark.files import write_csv, write_text
@@ -27,7 +28,7 @@ from baselines.learned.agents import SUFFIX, Agent, Card, save_agent
 from baselines.learned.estimates import BatchFilter
 from baselines.learned.evaluation import CURVE_COLUMNS, HELD_SEEDS, evaluate
 from baselines.learned.models import load_model, make_model, policy_arrays
-from baselines.learned.recipes import PICTURE, Domain, Recipe, SACRecipe
+from baselines.learned.recipes import Domain, Recipe, SACRecipe
 
 CONTROL_HZ = 30
 _CHECKPOINT, _BUFFER, _CURVE, _CONFIG = "checkpoint.zip", "buffer.pkl", "curve.csv", "config.json"

@@ -1,5 +1,6 @@
 """`FollowVectorEnv`: thousands of `FollowEnv`'s worlds at once, kinematic and compiled."""
 
+import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -79,7 +80,6 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         self._queues = np.zeros((num_envs, single._delay, 3))
         self._tapes = np.zeros((1, 1, 6))
         self._observations = np.zeros((num_envs, 8), np.float32)
-        self._infos = np.zeros(num_envs, INFO)
         self._done = np.zeros(num_envs, bool)
         self._started = False
         parts = min(threads or len(os.sched_getaffinity(0)), max(num_envs // WORLDS_PER_THREAD, 1))
@@ -119,22 +119,21 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         """
         if len(seeds) != self.num_envs:
             raise ValueError(f"{len(seeds)} seeds for {self.num_envs} worlds; expected one for each world")
-        single, worlds = self._single, self._worlds
-        steps = 0
-        tapes = []
+        single, tapes = self._single, []
         for i, seed in enumerate(seeds):
             rng, _ = seeding.np_random(seed)
             x, y, yaw = single.scene.start
             y += float(rng.uniform(-1.0, 1.0)) * single.scene.start_width
-            ahead = (x + SET_POINT * np.cos(yaw), y + SET_POINT * np.sin(yaw), yaw)
+            ahead = (x + SET_POINT * math.cos(yaw), y + SET_POINT * math.sin(yaw), yaw)
             route = make_route(single._route_name, single.scene, ahead, rng)
             self._give(i, (x, y, yaw), route)
-            steps = round(route.duration / single.dt) + 2
+            steps = math.ceil(route.duration / single.dt) + 1
             tapes.append([[*rng.standard_normal(1), *rng.standard_normal(1), *rng.random(4)] for _ in range(steps)])
         self._tapes = np.array(tapes)
-        worlds["given_route"] = True
-        self._seed(None, np.ones(self.num_envs, bool))
-        return self._begin(np.ones(self.num_envs, bool))
+        everyone = np.ones(self.num_envs, bool)
+        self._seed(seeds, everyone)
+        self._worlds["given_route"] = True
+        return self._begin(everyone)
 
     def step(self, actions: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Drive every world for one control period; a world that ended begins anew as `autoreset_mode` says."""
@@ -162,7 +161,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         if self._mode is AutoresetMode.SAME_STEP and self._done.any():
             final = self._finals(observations, infos)
             self._run(np.where(self._done, BEGIN, SKIP).astype(np.int8), commands, *outcome)
-        self._observations, self._infos = observations, infos
+        self._observations = observations.copy()
         return observations, rewards, terminated, truncated, {**_report(infos, np.ones(self.num_envs, bool)), **final}
 
     def close_extras(self, **kwargs: Any) -> None:
@@ -174,11 +173,11 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         outcome = self._outcome()
         observations, infos, *_ = outcome
         if not chosen.all():
-            observations[:], infos[:] = self._observations, self._infos
+            observations[:], infos[:] = self._observations, np.zeros(1, INFO)
         self._run(np.where(chosen, BEGIN, SKIP).astype(np.int8), np.zeros((self.num_envs, 2)), *outcome)
-        self._observations, self._infos = observations, infos
+        self._observations = observations.copy()
         self._done = self._done & ~chosen
-        return observations.copy(), _report(infos, chosen.copy())
+        return observations, _report(infos, chosen)
 
     def _outcome(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return fresh arrays for observations, infos, rewards, terminated and truncated."""
@@ -232,9 +231,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         if np.ndim(poses) == 1:
             poses = [poses] * self.num_envs
         if len(poses) != self.num_envs:
-            raise ValueError(
-                f"{len(poses)} robot poses for {self.num_envs} worlds; expected one for each world, or one"
-            )
+            raise ValueError(f"{len(poses)} robot poses for {self.num_envs} worlds; expected one for each world, or one")
         for i in np.flatnonzero(chosen):
             world = self._worlds[i]
             world["x"], world["y"], world["yaw"] = _pose(poses[i])

@@ -27,10 +27,8 @@ PERSON_LOW = 0.5 * PERSON_HEIGHT - 0.5 * (PERSON_HEIGHT - 2.0 * PERSON_RADIUS - 
 FURTHEST = 0.24
 """All parts but the wheels lie in a circle of this radius around the axle's middle, m."""
 
-OBSTACLE = np.dtype(
-    [(name, np.float64) for name in ("x", "y", "length", "width", "cosine", "sine", "radius")]
-    + [(name, np.float64) for name in ("low", "high", "reach")]
-)
+OBSTACLE = np.dtype([(name, np.float64) for name in ("x", "y", "length", "width", "cosine", "sine", "radius")] +
+                    [(name, np.float64) for name in ("low", "high", "reach")])
 """An upright prism: a rectangle (half sizes) grown by `radius`, between two heights, within `reach` of (x, y); m."""
 
 
@@ -107,7 +105,10 @@ def nearer_than(place, x, y, radius):
     least, most = _bounds(place.distance, place, x, y)
     if least >= radius or most < radius:
         return most < radius
-    return any(gap(place.obstacles[k], x, y) < radius for k in range(len(place.obstacles)))
+    for k in range(len(place.obstacles)):
+        if gap(place.obstacles[k], x, y) < radius:
+            return True
+    return False
 
 
 @_jit

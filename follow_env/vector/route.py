@@ -80,7 +80,7 @@ def _path_is_free(world, place):
     """Whether every third point of the route's table keeps the clearance."""
     x, y = world.person_x, world.person_y
     vx, vy = velocity(world, 0.0)
-    for i in range(math.ceil(DURATION / TABLE_STEP) + 1):
+    for i in range(int(math.ceil(DURATION / TABLE_STEP)) + 1):
         if i % 3 == 0 and nearer_than(place, x, y, CLEARANCE):
             return False
         x, y, vx, vy = _walk(world, x, y, vx, vy, i * TABLE_STEP, TABLE_STEP)

@@ -57,6 +57,52 @@ def _reproduce(parsed: argparse.Namespace) -> int:
     return 0
 
 
+def _bench(parsed: argparse.Namespace) -> int:
+    from baselines import calibration
+    from baselines.benchmark.episodes import Player
+    from baselines.benchmark.followers import EPISODES, bench
+    from baselines.benchmark.pool import EpisodeError
+
+    out = parsed.out or Path("results", parsed.suite)
+    player = Player()
+    try:
+        text = bench(parsed.episodes or EPISODES, calibration.settings(), player, out, parsed.jobs, parsed.resume)
+    except ValueError as error:
+        print(f"follow: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except EpisodeError as error:
+        print(f"follow: {error}\nWhat was finished is kept in {out}: --resume goes on with it.", file=sys.stderr)
+        return FAILED
+    finally:
+        player.close()
+    print(text)
+    print(f"Table and raw episodes are in {out}.")
+    return 0
+
+
+def _train(parsed: argparse.Namespace) -> int:
+    import dataclasses
+
+    from baselines.learned.recipes import RECIPES
+    from baselines.learned.training import train
+
+    recipe = RECIPES[parsed.recipe]
+    out = parsed.out or Path("results", "learned", f"{parsed.recipe}-{parsed.seed}")
+    try:
+        if parsed.steps is not None:
+            recipe = dataclasses.replace(recipe, steps=parsed.steps)
+        weights = train(parsed.recipe, recipe, parsed.seed, out, parsed.resume)
+    except ValueError as error:
+        print(f"follow: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(
+            f"interrupted: the finished legs are kept in {out}; the same command with --resume goes on."
+        ) from None
+    print(f"The agent is {weights}.")
+    return 0
+
+
 def _watch(parsed: argparse.Namespace) -> int:
     from baselines.watch import watch
 
@@ -156,6 +202,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_reproduce(commands)
+    _add_bench(commands)
+    _add_train(commands)
     _add_watch(commands)
     _add_track(commands)
     _add_calibrate(commands)
@@ -190,6 +238,31 @@ def _add_reproduce(commands: _Commands) -> None:
     )
     table1.add_argument("--resume", action="store_true", help="go on with the episodes the folder already holds")
     table1.set_defaults(run=_reproduce)
+
+
+def _add_bench(commands: _Commands) -> None:
+    bench = commands.add_parser("bench", help="compare followers on the same seeds")
+    bench.add_argument("suite", choices=("followers",), metavar="SUITE", help="followers: from parked to learned")
+    bench.add_argument("--episodes", type=_positive, metavar="N", help="episodes per cell (default: 100)")
+    _add_jobs(bench)
+    bench.add_argument("--out", type=Path, metavar="DIR", help="results folder (default: results/SUITE)")
+    bench.add_argument("--resume", action="store_true", help="go on with the episodes the folder already holds")
+    bench.set_defaults(run=_bench)
+
+
+def _add_train(commands: _Commands) -> None:
+    train = commands.add_parser("train", help="train a follower in the batch of worlds")
+    train.add_argument(
+        "recipe",
+        choices=("ppo", "ppo_estimate", "ppo_pixels", "recurrent_ppo", "sac"),
+        metavar="ALGO",
+        help="%(choices)s",
+    )
+    train.add_argument("--steps", type=_positive, metavar="N", help="environment steps (default: the recipe's)")
+    train.add_argument("--seed", type=_natural, default=0, metavar="S", help="default: %(default)s")
+    train.add_argument("--out", type=Path, metavar="DIR", help="default: results/learned/ALGO-S")
+    train.add_argument("--resume", action="store_true", help="go on after the last finished leg")
+    train.set_defaults(run=_train)
 
 
 def _add_watch(commands: _Commands) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from baselines.benchmark.assembly import environment_kwargs, follower
+from baselines.benchmark.assembly import driver, environment_kwargs
 from baselines.benchmark.cells import Cell
 from baselines.video import VideoWriter
 from follow_env.camera import PinholeCamera, Renderer, make_renderer
@@ -67,7 +67,7 @@ def watch(
         env.robot_config.camera_forward,
         f"{cell.scene}, {cell.perception}, {cell.estimator} + PI",
     )
-    policy, state = follower(cell, picture_size), None
+    policy, state = driver(cell, picture_size), None
     observation, info = env.reset(seed=seed)
     small: list[np.ndarray] = []
     with contextlib.ExitStack() as parts:

@@ -6,9 +6,10 @@ import json
 from collections.abc import Hashable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from baselines.benchmark.cells import Cell
+from baselines.benchmark.cells import PIXELS, Cell
 from baselines.calibration import NoiseModel, noise_model, sensor
-from baselines.policy import OBSERVATION_OF, Follower, make_follower
+from baselines.floors import FLOORS
+from baselines.policy import OBSERVATION_OF, Policy, make_follower
 from follow_env.config import CameraConfig
 
 if TYPE_CHECKING:
@@ -16,10 +17,14 @@ if TYPE_CHECKING:
 
 CAMERA = {"width": 320, "height": 240}
 """Picture of the `mask` rung, px."""
+PICTURE = {"width": 84, "height": 84}
+"""Picture of the agents that drive from pixels, px."""
 
 
 def environment_kwargs(cell: Cell, camera: Mapping[str, int] = CAMERA) -> dict[str, Any]:
     """Return what `FollowEnv` is made with for a cell; `camera` is for the `mask` rung."""
+    if cell.perception == PIXELS:
+        return {"scene": cell.scene, "obs": "rgbd_uint8", "camera": dict(PICTURE)}
     kwargs: dict[str, Any] = {"scene": cell.scene, "obs": OBSERVATION_OF[cell.perception]}
     if cell.perception == "emulated":
         kwargs["sensor"] = {"measurement": sensor(cell.sensor, cell.scene)}
@@ -40,8 +45,19 @@ def environment(cell: Cell) -> gymnasium.Env:
     return FollowEnv(**environment_kwargs(cell))
 
 
-def follower(cell: Cell, camera: Mapping[str, int] = CAMERA) -> Follower:
-    """Return the follower of a cell; `camera` is that of its environment."""
+def driver(cell: Cell, camera: Mapping[str, int] = CAMERA) -> Policy:
+    """Return what drives in a cell: the paper's follower, a floor or ceiling, or a learned agent.
+
+    Args:
+        cell: the factors.
+        camera: that of its environment.
+    """
+    if cell.controller in FLOORS:
+        return FLOORS[cell.controller]()
+    if cell.controller != "pi":
+        from baselines.learned.agents import load_agent
+
+        return load_agent(cell.controller, cell.scene)
     noise = noise_model(cell.perception, cell.scene, cell.sensor)
     q_bearing, q_distance = noise.process
     scaled = NoiseModel(noise.measurement, (cell.q_scale * q_bearing, cell.q_scale * q_distance), noise.acceleration)

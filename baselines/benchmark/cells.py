@@ -6,12 +6,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 PERCEPTIONS = ("truth", "emulated", "mask")
+"""The rungs of Table 1, from best to real."""
+PIXELS = "pixels"
+"""What a policy perceives that drives straight from the picture."""
 SCENES = ("corridor", "indoor")
 ESTIMATORS = ("none", "kf", "akf", "akf_cv")
 ENVIRONMENT_IDS = {"corridor": "follow_env/Corridor-v0", "indoor": "follow_env/Indoor-v0"}
-SENSORS = {"truth": "exact", "emulated": "fitted", "mask": "six_smallest"}
-"""Table 1's sensor at each perception: the emulated one that is fitted to the paper's No filter row, and the rule by
-which depth is read from the rendered box."""
+SENSORS = {"truth": "exact", "emulated": "fitted", "mask": "six_smallest", PIXELS: "xtion"}
+"""The sensor at each perception unless told otherwise: for Table 1 the emulated one that is fitted to the paper's
+No filter row, and the rule by which depth is read from the rendered box."""
 DEPTH_RULES = ("six_smallest", "grid_mean", "centroid")
 """Rules of `tracker.sampling` that are compared on rendered frames."""
 
@@ -24,10 +27,10 @@ class Cell:
     """One combination of the benchmark's factors.
 
     Attributes:
-        perception: Where the measurement comes from: ``truth``, ``emulated`` or ``mask``.
+        perception: Where the measurement comes from: ``truth``, ``emulated`` or ``mask``; ``pixels`` has none.
         scene: ``corridor`` or ``indoor``.
         estimator: ``none``, ``kf``, ``akf`` or ``akf_cv``.
-        controller: Name of the controller.
+        controller: ``pi``, ``parked``, ``random``, ``oracle`` or the name of a learned agent.
         q_scale: Multiple of the process noise that the rule for Q gives.
         alpha: Significance of the adaptive filter's outlier test.
         sensor: Name of the emulated sensor, or the depth rule of ``mask``; empty takes that of ``SENSORS``.
@@ -43,7 +46,7 @@ class Cell:
 
     def __post_init__(self) -> None:
         for field, value, known in (
-            ("perception", self.perception, PERCEPTIONS),
+            ("perception", self.perception, (*PERCEPTIONS, PIXELS)),
             ("scene", self.scene, SCENES),
             ("estimator", self.estimator, ESTIMATORS),
         ):

@@ -8,7 +8,7 @@ import importlib.metadata
 import json
 import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
@@ -18,7 +18,6 @@ from baselines.benchmark import metrics
 from baselines.benchmark.cells import ENVIRONMENT_IDS, Cell, family_cells, rule_cells, sensitivity_cells, table1_cells
 from follow_env.config import CameraConfig, RobotConfig, SensorConfig
 
-FILE_NAME = "config.json"
 EPISODES = {"truth": 100, "emulated": 100, "mask": 20}
 """Episodes per cell of Table 1 unless told otherwise, by perception: a rendered episode costs far more."""
 
@@ -124,7 +123,8 @@ def _code_digest() -> str:
     files = [
         path for folder in ("follow_env", "tracker", "baselines/controllers") for path in (root / folder).rglob("*.py")
     ]
-    files += [root / "baselines" / name for name in ("policy.py", "calibration.py")]
+    files += [root / "baselines" / name for name in ("policy.py", "calibration.py", "floors.py")]
+    files += [root / "baselines" / "learned" / name for name in ("agents.py", "networks.py")]
     files += [Path(__file__).with_name(name) for name in ("assembly.py", "cells.py", "episodes.py", "metrics.py")]
     total = hashlib.sha256()
     for path in sorted(files):
@@ -133,16 +133,30 @@ def _code_digest() -> str:
 
 
 def document(plan: Plan, settings: Mapping[str, Any], folder: Path, jobs: int) -> str:
+    """Text of ``config.json`` of a plan."""
+    cells = {"table1": plan.table, **plan.studies}
+    seeds = {
+        "table1": {perception: list(range(count)) for perception, count in plan.episodes.items()},
+        "studies": {study: list(plan.study_seeds(study)) for study in plan.studies},
+    }
+    return text(settings, run_digest(settings), cells, seeds, folder, jobs)
+
+
+def text(
+    settings: Mapping[str, Any],
+    run: str,
+    cells: Mapping[str, Iterable[Cell]],
+    seeds: Mapping[str, Any],
+    folder: Path,
+    jobs: int,
+) -> str:
     """Text of ``config.json``: the settings and their hash, and beside them, unhashed, how this run was made."""
     content = {
         "settings": settings,
         "settings_sha256": digest(settings),
-        "run_sha256": run_digest(settings),
-        "cells": {name: [cell.key for cell in cells] for name, cells in {"table1": plan.table, **plan.studies}.items()},
-        "seeds": {
-            "table1": {perception: list(range(count)) for perception, count in plan.episodes.items()},
-            "studies": {study: list(plan.study_seeds(study)) for study in plan.studies},
-        },
+        "run_sha256": run,
+        "cells": {name: [cell.key for cell in group] for name, group in cells.items()},
+        "seeds": seeds,
         "packages": packages(),
         "machine": machine(),
         "jobs": jobs,

@@ -90,13 +90,13 @@ class Player:
 
     def __call__(self, cell: Cell, seed: int) -> Episode:
         """Play the episode of this cell and seed; what was played before does not change it."""
-        from baselines.benchmark.assembly import environment, environment_key, follower
+        from baselines.benchmark.assembly import driver, environment, environment_key
 
         key = environment_key(cell)
         if self._env is None or key != self._key:
             self.close()
             self._env, self._key = environment(cell), key
-        return play(self._env, follower(cell), cell, seed)
+        return play(self._env, driver(cell), cell, seed)
 
     def close(self) -> None:
         """Close the environment; calling it again does nothing."""

@@ -146,6 +146,64 @@ class PooledError:
             )
 
 
+@dataclass(frozen=True)
+class Score:
+    """A score of one policy or of an algorithm trained from several seeds.
+
+    Attributes:
+        value: Of one training the plain score, of several the interquartile mean over them.
+        resamples: The same of each resample, shape (RESAMPLES,): episodes are resampled, and so are the trainings.
+    """
+
+    value: float
+    resamples: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, trainings: Sequence[Sequence[Row]], column: str, root_mean_square: bool) -> Score:
+        """Collect a column: its mean over episodes, or its RMS over their steps.
+
+        Args:
+            trainings: Rows of each training in the order of their seeds, the same seeds in each.
+            column: Of ``metrics.COLUMNS``; every episode has it.
+            root_mean_square: Whether the column is an RMS over steps, pooled as one; otherwise the mean is taken.
+        """
+        values = np.array([[float(str(row[column])) for row in rows] for rows in trainings])
+        weights = np.array([[float(str(row["steps"])) for row in rows] for rows in trainings])
+        if not root_mean_square:
+            weights = np.ones_like(weights)
+        sums = weights * (values * values if root_mean_square else values)
+        count = len(trainings)
+        totals, steps = np.zeros((count, RESAMPLES)), np.zeros((count, RESAMPLES))
+        for picks in _draws(values.shape[1]):
+            totals += sums[:, picks]
+            steps += weights[:, picks]
+        means, resampled = sums.sum(axis=1) / weights.sum(axis=1), totals / steps
+        if root_mean_square:
+            means, resampled = np.sqrt(means), np.sqrt(resampled)
+        chosen = np.random.default_rng(_GENERATOR_SEED).integers(0, count, size=(count, RESAMPLES))
+        return cls(
+            float(interquartile_mean(means[:, None])[0]),
+            interquartile_mean(np.take_along_axis(resampled, chosen, axis=0)),
+        )
+
+    @property
+    def interval(self) -> Interval:
+        """95 % interval."""
+        return _interval(self.resamples)
+
+    def minus(self, other: Score) -> Difference:
+        """Paired difference over the same episodes."""
+        return Difference(self.value - other.value, _interval(self.resamples - other.resamples))
+
+
+def interquartile_mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean along the first axis without the lowest and the highest quarter (rounded down) of its entries."""
+    cut = len(values) // 4
+    kept = np.sort(values, axis=0)[cut : len(values) - cut]
+    total: NDArray[np.float64] = kept.sum(axis=0)
+    return total / len(kept)
+
+
 def weighted_share(rows: Sequence[Row], column: str, weights: Sequence[float] | None = None) -> float | None:
     """Mean of a share over episodes, weighted by their scored steps or by one weight per row.
 

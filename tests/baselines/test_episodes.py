@@ -2,7 +2,7 @@
 
 import pytest
 
-from baselines.benchmark.assembly import environment, follower
+from baselines.benchmark.assembly import driver, environment
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.episodes import play
 from baselines.policy import make_follower
@@ -30,7 +30,7 @@ def test_success_is_what_the_environment_says(estimator, seed):
     env = environment(cell)
     witness = Witness(env)
 
-    episode = play(witness, follower(cell), cell, seed)
+    episode = play(witness, driver(cell), cell, seed)
 
     env.close()
     assert episode.row["success"] == int(witness.info["is_success"])

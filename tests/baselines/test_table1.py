@@ -23,7 +23,8 @@ from baselines.benchmark import reproduce as reproduction
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.configuration import Plan, digest, settings
 from baselines.benchmark.files import write_text
-from baselines.benchmark.reproduce import Interrupted, reproduce
+from baselines.benchmark.reproduce import reproduce
+from baselines.benchmark.running import Interrupted
 from baselines.benchmark.store import FILE_NAME, InputError, Store
 from baselines.benchmark.table1 import COLUMNS, PAPER_RMSE, paper_ratio
 

@@ -1,0 +1,189 @@
+"""`follow bench followers`: every follower on the same seeds in two scenes, from parked to learned."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from baselines.benchmark import configuration, metrics
+from baselines.benchmark.cells import PIXELS, SCENES, Cell
+from baselines.benchmark.episodes import EpisodeFunction
+from baselines.benchmark.files import Value, write_csv, write_text
+from baselines.benchmark.metrics import Row
+from baselines.benchmark.report import markdown_table
+from baselines.benchmark.running import TIMING_COLUMNS, rows, run, timings
+from baselines.benchmark.statistics import Score
+from baselines.benchmark.store import Store
+from baselines.learned.agents import load_agent, shipped, weights_file
+
+EPISODES = 100
+RANKED_TRAININGS = 5
+"""An algorithm trained from fewer seeds is shown, but nothing is claimed of its rank."""
+REFERENCE = "AKF + PI"
+SCORES = {
+    "success": ("success", False),
+    "angle_tracking_rmse_rad": ("angle_tracking_rmse_rad", True),
+    "distance_tracking_rmse_m": ("distance_tracking_rmse_m", True),
+    "loss_count": ("loss_count", False),
+    "in_band_share": ("in_band_share", False),
+    "rms_jerk_m_s3": ("rms_jerk_m_s3", True),
+    "rms_angular_jerk_rad_s3": ("rms_angular_jerk_rad_s3", True),
+}
+"""Score -> column of the episode's row, and whether it is pooled as a root mean square."""
+COMPARED = ("success", "angle_tracking_rmse_rad", "distance_tracking_rmse_m")
+COLUMNS = (
+    *("scene", "policy", "trainings", "episodes"),
+    *(f"{name}{end}" for name in SCORES for end in ("", "_low", "_high")),
+    *(f"{name}_minus_reference{end}" for name in COMPARED for end in ("", "_low", "_high")),
+    *("collisions", "lost"),
+)
+_DIGITS = 6
+
+
+def cells(agents: Sequence[str]) -> list[Cell]:
+    """Cells of the suite: followers with PI, floors, ceiling and the agents, in both scenes."""
+    found = []
+    for scene in SCENES:
+        found += [Cell("emulated", scene, estimator, sensor="default") for estimator in ("akf", "kf", "none")]
+        found += [Cell("emulated", scene, "none", name, sensor="default") for name in ("parked", "random")]
+        found.append(Cell("truth", scene, "none", "oracle"))
+        for name in agents:
+            pixels = load_agent(name).observation == "rgbd_uint8"
+            found.append(
+                Cell(PIXELS, scene, "none", name) if pixels else Cell("emulated", scene, "none", name, sensor="default")
+            )
+    return found
+
+
+def bench(
+    episodes: int, calibration: Mapping[str, Any], episode: EpisodeFunction, out: Path, jobs: int, resume: bool
+) -> str:
+    """Play the suite and write `followers.md`, `followers.csv` and the raw episodes; see `running.run` for errors.
+
+    Args:
+        episodes: Per cell.
+        calibration: Content of the calibration, part of the configuration's hash.
+        episode: Plays one cell and seed.
+        out: Results folder.
+        jobs: Number of processes; the results do not depend on it.
+        resume: Whether to go on with what the folder holds.
+    """
+    agents = shipped()
+    plan = {cell: range(episodes) for cell in cells(agents)}
+    weights = {name: hashlib.sha256(weights_file(name).read_bytes()).hexdigest() for name in agents}
+    settings = {**configuration.settings(calibration), "benchmark": "followers", "agents": weights}
+    digest = configuration.run_digest(settings)
+    config = configuration.text(
+        settings, digest, {"followers": list(plan)}, {"followers": list(range(episodes))}, out, jobs
+    )
+    tasks = [(cell, seed) for cell, seeds in plan.items() for seed in seeds]
+
+    def write(store: Store) -> str:
+        played = {cell: [store.episode(cell, seed) for seed in seeds] for cell, seeds in plan.items()}
+        write_csv(out / "episodes.csv", metrics.COLUMNS, rows(played))
+        write_csv(out / "timing.csv", TIMING_COLUMNS, timings(played))
+        found = records({cell: [one.row for one in group] for cell, group in played.items()})
+        write_csv(out / "followers.csv", COLUMNS, found, _DIGITS)
+        text = report(found)
+        write_text(out / "followers.md", text)
+        return text
+
+    return run(tasks, digest, config, episode, write, out, jobs, resume)
+
+
+def records(played: Mapping[Cell, Sequence[Row]]) -> list[dict[str, Value]]:
+    """One record of `COLUMNS` for each scene and policy; the trainings of one recipe make one policy.
+
+    Args:
+        played: Episode rows of each cell in the order of their seeds.
+    """
+    groups: dict[tuple[str, str], list[Sequence[Row]]] = {}
+    for cell, group in played.items():
+        groups.setdefault((cell.scene, policy_name(cell)), []).append(group)
+    scores = {
+        key: {name: Score.of(trainings, *how) for name, how in SCORES.items()} for key, trainings in groups.items()
+    }
+    found = []
+    for (scene, policy), trainings in groups.items():
+        ends = [row["ended"] for rows_ in trainings for row in rows_]
+        record: dict[str, Value] = {
+            "scene": scene,
+            "policy": policy,
+            "trainings": len(trainings) if _learned(policy) else None,
+            "episodes": len(trainings[0]),
+            "collisions": ends.count("collision") / len(ends),
+            "lost": ends.count("lost") / len(ends),
+        }
+        for name, score in scores[scene, policy].items():
+            record[name] = score.value
+            record[f"{name}_low"], record[f"{name}_high"] = score.interval
+        for name in COMPARED:
+            difference = scores[scene, policy][name].minus(scores[scene, REFERENCE][name])
+            is_reference = policy == REFERENCE
+            low, high = difference.interval or (None, None)
+            for end, value in (("", difference.value), ("_low", low), ("_high", high)):
+                record[f"{name}_minus_reference{end}"] = None if is_reference else value
+        found.append(record)
+    return found
+
+
+def policy_name(cell: Cell) -> str:
+    """What drives in a cell, as tables name it; the seed of an agent's training is left out."""
+    if cell.controller == "pi":
+        return f"{'no filter' if cell.estimator == 'none' else cell.estimator.upper()} + PI"
+    return cell.controller.rpartition("-")[0] or cell.controller
+
+
+def report(found: Sequence[Mapping[str, Value]]) -> str:
+    """Return the table as Markdown that also reads well on a terminal."""
+    header = ["scene", "policy", "success", "angle RMSE (rad)", "distance RMSE (cm)", "minus AKF + PI (cm)"]
+    header += ["lost", "collided", "losses", "jerk (m/s³)", "trainings"]
+    lines = []
+    for record in found:
+        lines.append(
+            [
+                str(record["scene"]),
+                str(record["policy"]),
+                f"{_number(record, 'success'):.0%}",
+                _interval(record, "angle_tracking_rmse_rad", 1.0, 3),
+                _interval(record, "distance_tracking_rmse_m", 100.0, 1),
+                _interval(record, "distance_tracking_rmse_m_minus_reference", 100.0, 1),
+                *(f"{_number(record, name):.0%}" for name in ("lost", "collisions")),
+                f"{_number(record, 'loss_count'):.2f}",
+                f"{_number(record, 'rms_jerk_m_s3'):.1f}",
+                "–" if record["trainings"] is None else str(record["trainings"]),
+            ]
+        )
+    few = sorted(
+        {str(r["policy"]) for r in found if r["trainings"] is not None and int(str(r["trainings"])) < RANKED_TRAININGS}
+    )
+    parts = [
+        "# Followers",
+        f"{found[0]['episodes']} episodes per cell on the same seeds, in PyBullet. Angle and distance RMSE are "
+        "tracking errors: the person's true bearing and\ndistance against the set point (0 rad, 1.5 m), pooled over "
+        "all steps. 95 % bootstrap intervals over episodes and trainings;\nlearned policies: interquartile mean over "
+        "the trainings. Losses: times per episode that the person left the view.",
+        markdown_table(header, lines, left=2),
+    ]
+    if few:
+        parts.append(
+            f"Trained from fewer than {RANKED_TRAININGS} seeds, so nothing is claimed of the rank of: {', '.join(few)}."
+        )
+    return "\n\n".join(parts) + "\n"
+
+
+def _learned(policy: str) -> bool:
+    return "PI" not in policy and policy not in ("parked", "random", "oracle")
+
+
+def _number(record: Mapping[str, Value], name: str) -> float:
+    return float(str(record[name]))
+
+
+def _interval(record: Mapping[str, Value], name: str, scale: float, digits: int) -> str:
+    if record[name] is None:
+        return "–"
+    value, low, high = (f"{scale * _number(record, name + end):.{digits}f}" for end in ("", "_low", "_high"))
+    return f"{value} ({low} to {high})"

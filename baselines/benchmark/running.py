@@ -1,0 +1,128 @@
+"""Running a plan: claim a folder, play what is missing, keep each episode, end cleanly on Ctrl-C."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+from baselines.benchmark import store
+from baselines.benchmark.cells import Cell
+from baselines.benchmark.episodes import Episode, EpisodeFunction
+from baselines.benchmark.files import Value, write_text
+from baselines.benchmark.metrics import Row
+from baselines.benchmark.pool import Task, play_all
+from baselines.benchmark.progress import progress
+from baselines.benchmark.store import InputError, Store
+
+CONFIG = "config.json"
+_RESULTS = (CONFIG, "table1.csv", "table1.md", "followers.csv", "followers.md", "episodes.csv")
+TIMING_COLUMNS = ("cell", "seed", "policy_step_mean_s", "policy_step_p95_s")
+
+
+class Interrupted(KeyboardInterrupt):
+    """The user stopped the run; the message says what was kept and how to go on."""
+
+
+def run(
+    tasks: Sequence[Task],
+    digest: str,
+    config: str,
+    episode: EpisodeFunction,
+    write: Callable[[Store], str],
+    out: Path,
+    jobs: int,
+    resume: bool,
+) -> str:
+    """Play the tasks that the folder lacks, then write every result into it.
+
+    Args:
+        tasks: Cells and seeds, each once.
+        digest: Hash of all that episodes in one folder must share.
+        config: Text of ``config.json``.
+        episode: Plays one cell and seed; picklable when several jobs are used.
+        write: Writes tables and figures from the finished episodes and returns the report.
+        out: Results folder; made when missing.
+        jobs: Number of processes. The results do not depend on it.
+        resume: Whether to go on with the episodes that the folder already holds.
+
+    Returns:
+        The report.
+
+    Raises:
+        InputError: If the folder cannot be used; nothing in it has changed.
+        EpisodeError: If an episode fails; the finished ones are kept.
+        Interrupted: On Ctrl-C; the finished episodes are kept.
+    """
+    _claim(out)
+    with Store(out, digest) as episodes:
+        if len(episodes) and not resume:
+            raise InputError(
+                f"{out} already holds {len(episodes)} episodes of this configuration: "
+                "go on with --resume, or choose another folder with --out."
+            )
+        try:
+            with _writable(out):
+                write_text(out / CONFIG, config)
+            _play_missing(tasks, episode, episodes, jobs)
+            with _writable(out):
+                return write(episodes)
+        except KeyboardInterrupt:
+            kept = len(tasks) - len(_missing(tasks, episodes))
+            raise Interrupted(
+                f"interrupted: {kept} of {len(tasks)} episodes are kept in {out}; "
+                "the same command with --resume goes on."
+            ) from None
+
+
+def rows(played: Mapping[Cell, Sequence[Episode]]) -> list[Row]:
+    """The episodes' rows in the order of the cells."""
+    return [episode.row for group in played.values() for episode in group]
+
+
+def timings(played: Mapping[Cell, Sequence[Episode]]) -> list[dict[str, Value]]:
+    """One record of TIMING_COLUMNS for each episode."""
+    return [
+        dict(zip(TIMING_COLUMNS, (cell.key, seed, episode.timing.mean, episode.timing.p95), strict=True))
+        for cell, group in played.items()
+        for seed, episode in enumerate(group)
+    ]
+
+
+def _claim(out: Path) -> None:
+    """Make the folder, and refuse one whose results would be lost."""
+    with _writable(out):
+        out.mkdir(parents=True, exist_ok=True)
+        results = [name for name in _RESULTS if (out / name).exists()]
+        path = out / store.FILE_NAME
+        stored = path.exists() and path.stat().st_size > 0
+    if results and not stored:
+        raise InputError(
+            f"{out} holds {results[0]} but not the episodes it was made from ({store.FILE_NAME}), so it would be lost: "
+            "choose another folder with --out."
+        )
+
+
+@contextlib.contextmanager
+def _writable(out: Path) -> Iterator[None]:
+    """Turn the system's refusals into sentences with a remedy."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"{out} cannot be written ({error.strerror or error}): make it a writable folder on a disk with space, "
+            "or choose another with --out."
+        ) from error
+
+
+def _play_missing(tasks: Sequence[Task], episode: EpisodeFunction, episodes: Store, jobs: int) -> None:
+    missing = _missing(tasks, episodes)
+    if missing:
+        with contextlib.closing(play_all(episode, missing, jobs)) as playing:
+            for (cell, seed), result in progress(playing, total=len(tasks), done=len(tasks) - len(missing)):
+                episodes.add(cell, seed, result)
+
+
+def _missing(tasks: Sequence[Task], episodes: Store) -> list[Task]:
+    finished = episodes.finished()
+    return [(cell, seed) for cell, seed in tasks if (cell.key, seed) not in finished]

@@ -1,0 +1,93 @@
+"""Training is deterministic, goes on where it stopped, and refuses what it cannot do."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from baselines.benchmark.store import InputError
+from baselines.learned import training
+from baselines.learned.agents import load_agent
+from baselines.learned.recipes import RECIPES, Recipe
+from follow_env.env import FollowEnv
+
+SHORT = {
+    "ppo": {"steps": 3000, "worlds": 24, "legs": 3, "rollout": 32, "minibatch": 256, "epochs": 2},
+    "ppo_estimate": {"steps": 1000, "worlds": 24, "legs": 1, "rollout": 32, "minibatch": 256, "epochs": 2},
+    "recurrent_ppo": {"steps": 1000, "worlds": 24, "legs": 1, "rollout": 32, "minibatch": 256, "epochs": 1},
+    "sac": {"steps": 1500, "worlds": 24, "legs": 2, "warm_up": 200, "buffer": 2000, "minibatch": 64},
+}
+
+
+@pytest.fixture(autouse=True)
+def _one_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(training, "HELD_SEEDS", range(1))
+
+
+def short(name: str) -> Recipe:
+    return dataclasses.replace(RECIPES[name], **SHORT[name])
+
+
+def train(name: str, out: Path, **arguments: object) -> Path:
+    return training.train(name, short(name), 3, out, say=lambda _: None, **arguments)
+
+
+def curve(out: Path) -> list[dict[str, float]]:
+    return [{key: value for key, value in leg.items() if key != "wall_s"} for leg in training.read_curve(out)]
+
+
+@pytest.mark.parametrize("name", ["ppo", "sac"])
+def test_a_resumed_training_is_one_that_never_stopped(name: str, tmp_path: Path) -> None:
+    whole = train(name, tmp_path / "whole")
+
+    class Stop(Exception):
+        pass
+
+    def stop(_: str) -> None:
+        raise Stop
+
+    with pytest.raises(Stop):
+        training.train(name, short(name), 3, tmp_path / "parts", say=stop)
+    assert len(curve(tmp_path / "parts")) == 1
+    parts = train(name, tmp_path / "parts", resume=True)
+    assert parts.read_bytes() == whole.read_bytes()
+    assert curve(tmp_path / "parts") == curve(tmp_path / "whole")
+
+
+@pytest.mark.parametrize("name", ["ppo_estimate", "recurrent_ppo"])
+def test_every_recipe_makes_an_agent_that_drives(name: str, tmp_path: Path) -> None:
+    agent, state = load_agent(train(name, tmp_path), scene="indoor"), None
+    env = FollowEnv("indoor", obs=agent.observation)
+    observation, _ = env.reset(seed=1)
+    actions = []
+    for _ in range(10):
+        action, state = agent.predict(observation, state)
+        observation, *_ = env.step(action)
+        actions.append(action)
+    env.close()
+    assert np.ptp(actions, axis=0).max() > 0.0
+    assert (state.estimate is not None) == (name == "ppo_estimate")
+
+
+def test_a_folder_with_another_training_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "config.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match="already holds a training"):
+        train("ppo", tmp_path)
+    with pytest.raises(InputError, match="another recipe, seed or version"):
+        train("ppo", tmp_path, resume=True)
+
+
+def test_a_recipe_checks_its_numbers() -> None:
+    with pytest.raises(ValueError, match="worlds is 0; expected a whole number from 1"):
+        dataclasses.replace(RECIPES["ppo"], worlds=0)
+    with pytest.raises(ValueError, match="did you mean 'measurement'"):
+        dataclasses.replace(RECIPES["ppo"], observation="measurment")
+
+
+def test_the_digest_covers_the_domains(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = RECIPES["ppo"].digest()
+    assert before == RECIPES["ppo"].digest()
+    assert before != RECIPES["ppo_estimate"].digest()
+    monkeypatch.setattr("baselines.learned.recipes.DOMAINS", RECIPES["ppo"].domains[:1])
+    assert RECIPES["ppo"].digest() != before

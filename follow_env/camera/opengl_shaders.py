@@ -49,7 +49,7 @@ _SHADOWS = """
 uniform sampler2DShadow shadow_map;  // one square a lamp, side by side
 uniform mat4 shadow_projections[LAMPS];
 
-// The share of a lamp's direct light that reaches a point: 4 x 4 look-ups soften the edge. A lamp looks down, and where
+// The share of a lamp's direct light that reaches a point: 3 x 3 look-ups soften the edge. A lamp looks down, and where
 // its picture ends the shadow fades.
 float lit(int lamp, vec3 point) {
     vec4 seen = shadow_projections[lamp] * vec4(point, 1.0);
@@ -59,11 +59,11 @@ float lit(int lamp, vec3 point) {
     vec2 texel = 1.0 / vec2(textureSize(shadow_map, 0));
     place = 0.5 * place + 0.5;
     float open = 0.0;
-    for (int i = 0; i < 16; i++) {
-        vec2 aside = 1.5 * (vec2(i % 4, i / 4) - 1.5) * texel;
+    for (int i = 0; i < 9; i++) {
+        vec2 aside = 2.0 * (vec2(i % 3, i / 3) - 1.0) * texel;
         open += texture(shadow_map, vec3((place.x + lamp) / LAMPS + aside.x, place.y + aside.y, place.z));
     }
-    return mix(1.0, open / 16.0, min(inside, 1.0));
+    return mix(1.0, open / 9.0, min(inside, 1.0));
 }
 """
 

@@ -72,7 +72,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         name = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
         mode = AutoresetMode(choose("autoreset_mode", name, [m.value for m in AutoresetMode]))
         single = FollowEnv(**settings)
-        _check_batchable(single, settings)
+        _check_batchable(single)
         self.num_envs, self._mode, self._single = num_envs, mode, single
         self.metadata = {**self.metadata, "render_fps": single.metadata["render_fps"], "autoreset_mode": mode}
         self.single_action_space, self.single_observation_space = single.action_space, single.observation_space
@@ -304,7 +304,7 @@ def _shares(count: int, parts: int) -> list[tuple[int, int]]:
     return list(pairwise(edges))
 
 
-def _check_batchable(single: FollowEnv, settings: dict[str, Any]) -> None:
+def _check_batchable(single: FollowEnv) -> None:
     """Raise a ValueError for what `FollowEnv` can do and a batch cannot."""
     if single._obs not in OBSERVATIONS:
         raise ValueError(

@@ -219,14 +219,14 @@ def halve(fine, rgb):
 
 
 class _Announcer(event.Listener):
-    """Says once that the camera is being compiled."""
+    """Says once that kernels are being compiled."""
 
     announced = False
 
     def on_start(self, event: Any) -> None:
         if not _Announcer.announced:
             _Announcer.announced = True
-            print("compiling the camera, once", file=sys.stderr, flush=True)
+            print("compiling the kernels, once", file=sys.stderr, flush=True)
 
     def on_end(self, event: Any) -> None:
         """Nothing is said at the end."""

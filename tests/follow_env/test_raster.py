@@ -477,7 +477,7 @@ def test_another_processor_gives_the_same_bits_and_compiles_once(tmp_path):
         "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), *sys.path]),
     }
     code = f"import runpy; print(runpy.run_path({__file__!r})['golden']())"
-    for announcement in (["compiling the camera, once"], []):
+    for announcement in (["compiling the kernels, once"], []):
         done = subprocess.run(
             [sys.executable, "-W", "error", "-c", code], env=environment, capture_output=True, text=True, timeout=300
         )

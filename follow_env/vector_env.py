@@ -49,7 +49,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         num_envs: number of worlds.
         autoreset_mode: `AutoresetMode` or its value: `"NextStep"` (Gymnasium's default), `"SameStep"` (what
             Stable-Baselines3 does) or `"Disabled"`.
-        threads: threads that share the worlds; by default one for each processor that this process may use.
+        threads: threads that share the worlds; by default one for each processor.
         settings: those of `FollowEnv`. Not to be had in a batch: `obs="rgbd_box"`, `renderer="tiny"`, a `render_mode`,
             the robot's `max_wheel_torque`.
 
@@ -86,7 +86,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         self._observations = np.zeros((num_envs, 0 if self._settings["pictures"][0] else 8), np.float32)
         self._done = np.zeros(num_envs, bool)
         self._started = False
-        threads = threads or len(os.sched_getaffinity(0))
+        threads = threads or os.cpu_count() or 1
         self._ranges = _shares(num_envs, min(threads, max(num_envs // WORLDS_PER_THREAD, 1)))
         self._pictures: Pictures | None = None
         self._artists: list[Artist] = []

@@ -243,11 +243,11 @@ class MeasurementConfig:
     """
 
     bearing_bias: float = 0.0
-    bearing_noise: float = 0.012
-    bearing_correlation_s: float = 0.1
-    distance_bias: float = -0.105
-    distance_noise: float = 0.01
-    distance_correlation_s: float = 0.4
+    bearing_noise: float = 0.019
+    bearing_correlation_s: float = 0.27
+    distance_bias: float = -0.09
+    distance_noise: float = 0.013
+    distance_correlation_s: float = 0.2
     outlier_share: float = 0.0
     outlier_duration_s: float = 0.1
     outlier_low: float = 1.0

@@ -95,7 +95,7 @@ class FollowEnv(gymnasium.Env):
         ValueError: for an unknown name or an impossible value, in one sentence.
     """
 
-    metadata = {"render_modes": ["rgb_array", "rgbd_tuple", "human"], "render_fps": 30}  # noqa: RUF012
+    metadata = {"render_modes": ["rgb_array", "rgbd_tuple", "human"], "render_fps": 30, "engine": "pybullet"}  # noqa: RUF012
 
     def __init__(
         self,

@@ -49,7 +49,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         num_envs: number of worlds.
         autoreset_mode: `AutoresetMode` or its value: `"NextStep"` (Gymnasium's default), `"SameStep"` (what
             Stable-Baselines3 does) or `"Disabled"`.
-        threads: threads that share the worlds; by default one for each processor that this process may use.
+        threads: threads that share the worlds; by default one for each processor.
         settings: those of `FollowEnv`. Not to be had in a batch: `obs="rgbd_box"`, `renderer="tiny"`, a `render_mode`,
             the robot's `max_wheel_torque`.
 
@@ -72,7 +72,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         name = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
         mode = AutoresetMode(choose("autoreset_mode", name, [m.value for m in AutoresetMode]))
         single = FollowEnv(**settings)
-        _check_batchable(single, settings)
+        _check_batchable(single)
         self.num_envs, self._mode, self._single = num_envs, mode, single
         self.metadata = {**self.metadata, "render_fps": single.metadata["render_fps"], "autoreset_mode": mode}
         self.single_action_space, self.single_observation_space = single.action_space, single.observation_space
@@ -86,11 +86,11 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         self._observations = np.zeros((num_envs, 0 if self._settings["pictures"][0] else 8), np.float32)
         self._done = np.zeros(num_envs, bool)
         self._started = False
-        threads = threads or len(os.sched_getaffinity(0))
+        threads = threads or os.cpu_count() or 1
         self._ranges = _shares(num_envs, min(threads, max(num_envs // WORLDS_PER_THREAD, 1)))
         self._pictures: Pictures | None = None
         self._artists: list[Artist] = []
-        with announced():
+        with announced("the worlds"):
             self._play(0, 0, np.zeros(num_envs, np.int8), np.zeros((num_envs, 2)), *self._outcome())
             if self._settings["pictures"][0]:
                 self._picture_ranges = _shares(num_envs, min(threads, num_envs))
@@ -304,7 +304,7 @@ def _shares(count: int, parts: int) -> list[tuple[int, int]]:
     return list(pairwise(edges))
 
 
-def _check_batchable(single: FollowEnv, settings: dict[str, Any]) -> None:
+def _check_batchable(single: FollowEnv) -> None:
     """Raise a ValueError for what `FollowEnv` can do and a batch cannot."""
     if single._obs not in OBSERVATIONS:
         raise ValueError(

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.benchmark.assembly import environment, environment_kwargs, follower
+from baselines.benchmark.assembly import driver, environment, environment_kwargs
 from baselines.benchmark.cells import SCENES, Cell
 from baselines.benchmark.episodes import play
 from baselines.benchmark.metrics import EpisodeMetrics, Row
@@ -83,7 +83,7 @@ def following(scene: str, seeds: Sequence[int], estimator: str = "akf") -> list[
     """Let the paper's follower drive both engines through the same routes with the same measurement errors."""
     cell = Cell("emulated", scene, estimator)
     env = environment(cell)
-    physics = [play(env, follower(cell), cell, seed).row for seed in seeds]
+    physics = [play(env, driver(cell), cell, seed).row for seed in seeds]
     env.close()
     kinematic = _play_batch(cell, seeds)
     same = sum(a["ended"] == b["ended"] for a, b in zip(physics, kinematic, strict=True)) / len(seeds)
@@ -134,7 +134,7 @@ _POOLS: dict[str, Callable[[Sequence[Row]], PooledError]] = {
 def _drives(scene: str, seeds: Sequence[int]) -> Iterable[tuple[NDArray[np.float64], list[tuple[float, float]]]]:
     """Yield the poses (n + 1, 3) and the n rim-speed commands of closed-loop episodes with PyBullet."""
     cell = Cell("emulated", scene, "akf")
-    env, policy = FollowEnv(**environment_kwargs(cell)), follower(cell)
+    env, policy = FollowEnv(**environment_kwargs(cell)), driver(cell)
     drive = DiffDrive(env.robot_config)
     for seed in seeds:
         observation, info = env.reset(seed=seed)
@@ -168,7 +168,7 @@ def _replay(poses: NDArray[np.float64], commands: Sequence[tuple[float, float]],
 
 def _play_batch(cell: Cell, seeds: Sequence[int]) -> list[Row]:
     """Play the episodes of `FollowEnv` in the batch and measure them as `episodes.play` does."""
-    env, policy = FollowVectorEnv(len(seeds), **environment_kwargs(cell)), follower(cell)
+    env, policy = FollowVectorEnv(len(seeds), **environment_kwargs(cell)), driver(cell)
     metrics = [EpisodeMetrics(cell, seed) for seed in seeds]
     rows: list[Row | None] = [None] * len(seeds)
     terminated = truncated = np.zeros(len(seeds), bool)

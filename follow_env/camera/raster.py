@@ -86,7 +86,7 @@ class RasterRenderer:
     def _render_into(self, frame: RGBDFrame, camera: CameraPose, people: Sequence[Placed]) -> None:
         view = self._view(camera, 1)
         self._place(people)
-        with nullcontext() if self._warm else announced():
+        with nullcontext() if self._warm else announced("the camera"):
             if self._supersample == 2:
                 self._draw(self._view(camera, 2), True, self._fine)
                 halve(self._fine.rgb, frame.rgb)

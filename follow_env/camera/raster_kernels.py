@@ -6,7 +6,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numba import njit
@@ -236,21 +236,24 @@ def halve(fine, rgb):
 
 
 class _Announcer(event.Listener):
-    """Says once that the camera is being compiled."""
+    """Says that `what` is being compiled, once in a process."""
 
-    announced = False
+    said: ClassVar[set[str]] = set()
+
+    def __init__(self, what: str) -> None:
+        self._what = what
 
     def on_start(self, event: Any) -> None:
-        if not _Announcer.announced:
-            _Announcer.announced = True
-            print("compiling the camera, once", file=sys.stderr, flush=True)
+        if self._what not in _Announcer.said:
+            _Announcer.said.add(self._what)
+            print(f"compiling {self._what}, once", file=sys.stderr, flush=True)
 
     def on_end(self, event: Any) -> None:
         """Nothing is said at the end."""
 
 
 @contextmanager
-def announced() -> Iterator[None]:
+def announced(what: str) -> Iterator[None]:
     """Say on stderr, once, if what runs inside has to be compiled because the cache is empty or stale."""
-    with event.install_listener("numba:compile", _Announcer()):
+    with event.install_listener("numba:compile", _Announcer(what)):
         yield

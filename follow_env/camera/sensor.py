@@ -101,7 +101,7 @@ class RGBDSensor:
         """
         key = np.array((seed & 0xFFFFFFFF, seed >> 32), np.uint32)
         depth = np.empty_like(frame.depth)
-        with nullcontext() if self._warm else announced():
+        with nullcontext() if self._warm else announced("the camera"):
             corrupt_depth(frame.depth, frame.rgb, key, self._model, self._normal, self._shift, self._work, depth)
             rgb = frame.rgb
             if not self._exact_colour:

@@ -53,13 +53,13 @@ def pack_place(scene: Scene, camera_height: float, chest_height: float) -> Place
     rows = []
     for p in scene.obstacles():
         if isinstance(p, Box):
-            half_height, length, width, radius, yaw = 0.5 * p.size[2], 0.5 * p.size[0], 0.5 * p.size[1], 0.0, p.yaw
+            length, width, radius, yaw = 0.5 * p.size[0], 0.5 * p.size[1], 0.0, p.yaw
         else:
-            half_height, length, width, radius, yaw = 0.5 * p.height, 0.0, 0.0, p.radius, 0.0
+            length, width, radius, yaw = 0.0, 0.0, p.radius, 0.0
         reach = math.sqrt(length * length + width * width) + radius
         x, y, z = p.centre
         footprint = (x, y, length, width, math.cos(yaw), math.sin(yaw), radius)
-        rows.append((*footprint, z - half_height, z + half_height, reach))
+        rows.append((*footprint, p.bottom, 2.0 * z - p.bottom, reach))
     obstacles = np.array(rows, OBSTACLE)
     low, high = sorted((camera_height, chest_height))
     sight = obstacles[(obstacles["low"] <= high) & (obstacles["high"] >= low)]

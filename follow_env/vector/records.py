@@ -38,14 +38,14 @@ WORLD = np.dtype(
         ("turn_start", np.float64, MOST_TURNS),
         ("turn_duration", np.float64, MOST_TURNS),
         ("turn_angle", np.float64, MOST_TURNS),
-        *_reals("bearing", "distance", "left_of_robot", "surface_distance"),
+        *_reals("bearing", "distance", "surface_distance"),
         *_reals("bearing_error", "distance_error", "outlier", "last_measured"),
         *((name, np.bool_) for name in ("visible", "saturated")),
         *((name, np.bool_) for name in ("given_pose", "given_route", "taped")),  # see `episode.begin`
     ],
     align=True,
 )
-"""One world. `Route`'s notation for the route; `_Look`'s truth of this moment; counters as in `FollowEnv`."""
+"""One world: its robot, its person and route, the truth of this moment, the errors of its sensor, and its counters."""
 
 INFO = np.dtype(
     [

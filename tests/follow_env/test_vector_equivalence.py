@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from numba import njit
-from scipy import stats
+from scipy import optimize, stats
 
 from follow_env import IDS
 from follow_env.config import RobotConfig
@@ -13,6 +13,7 @@ from follow_env.env import FollowEnv
 from follow_env.physics import World
 from follow_env.routes import make_route
 from follow_env.scenes import make_scene
+from follow_env.vector.drive import roll
 from follow_env.vector.place import free_sight, pack_place, touches_person, touches_place
 from follow_env.vector_env import FollowVectorEnv
 
@@ -204,3 +205,29 @@ def test_the_same_pictures_come_out(scene, obs):
             assert observations["twist"][1] == pytest.approx(wanted["twist"], abs=0.02)
     batch.close()
     single.close()
+
+
+@pytest.mark.parametrize("tau", [0.06, 0.15])
+@pytest.mark.parametrize("rims", [(0.8, 0.8), (-0.3, 0.3)], ids=["straight", "spin"])
+def test_the_wheels_answer_a_step_with_the_time_constant_of_the_settings(tau, rims):
+    """Identification: the time constant with which the model fits PyBullet's odometry best."""
+    world = World(make_scene("corridor"), RobotConfig(wheel_time_constant=tau))
+    world.reset((0.0, 0.0, 0.0), (9.0, 0.0, 0.0))
+    odometry, commands = [], []
+    for _ in range(30):
+        odometry.append(world.step(*rims, 8))
+        commands.append(world.wheel_command)
+    world.close()
+
+    def misfit(guess):
+        left = right = total = 0.0
+        for command, (v, omega) in zip(commands, odometry, strict=True):
+            *_, left, right, my_v, my_omega = roll(
+                0.0, 0.0, 0.0, left, right, *command, math.exp(-1 / 240 / guess), 8, 0.3
+            )
+            total += (v - my_v) ** 2 + (0.15 * (omega - my_omega)) ** 2
+        return total
+
+    fit = optimize.minimize_scalar(misfit, bounds=(0.02, 0.4), method="bounded")
+    assert fit.x == pytest.approx(tau, rel=0.03)
+    assert math.sqrt(fit.fun / 30) < 0.003

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from follow_env.camera.depth import DepthSensor
+from follow_env.camera.frame import RGBDFrame
 from follow_env.camera.mesh import Placed
 from follow_env.camera.pinhole import CameraPose, PinholeCamera
 from follow_env.camera.raster import RasterRenderer
-from follow_env.config import CameraConfig, DepthConfig
+from follow_env.camera.sensor import RGBDSensor
+from follow_env.config import IDEAL_SENSOR, CameraConfig, DepthConfig
 from follow_env.person.bodies import BODIES, OUTFITS, PATTERNS, Outfit, load_body
 from follow_env.person.walker import POSTURES, Walker
 from follow_env.scene import Scene
@@ -105,6 +106,8 @@ class SampleSource:
     def __init__(self, seed: int, config: DataConfig | None = None) -> None:
         self.seed, self.config = seed, config or DataConfig()
         self._camera = PinholeCamera(CAMERA)
+        square = PinholeCamera(CameraConfig(width=INPUT_SIZE, height=INPUT_SIZE, hfov_deg=CAMERA.hfov_deg))
+        self._sensor = RGBDSensor(DepthConfig(), IDEAL_SENSOR.colour, square)
         self._walkers = {
             (name, detail): Walker(load_body(name, detail=detail)) for name in BODIES for detail in ("low", "high")
         }
@@ -126,7 +129,7 @@ class SampleSource:
         window = self._draw_window(rng)
         rgb = self._warp(frame.rgb, window, cv2.INTER_LINEAR, cv2.BORDER_REPLICATE)
         ids = self._warp(frame.ids, window, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT)
-        depth = self._sensed(frame.depth, window, rng) if config.depth else None
+        depth = self._sensed(frame.depth, rgb, window, rng) if config.depth else None
         if rng.random() < 0.07:
             rgb = np.where(ids[:, :, None] == 0, draw_backdrop(ids.shape, rng), rgb)
         if rng.random() < 0.15:
@@ -221,12 +224,14 @@ class SampleSource:
         size = (INPUT_SIZE, INPUT_SIZE)
         return cv2.warpPerspective(picture, lens @ window @ centre, size, flags=flags, borderMode=border)
 
-    def _sensed(self, depth: np.ndarray, window: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return the reported depth along the inclined camera's axis."""
+    def _sensed(self, depth: np.ndarray, rgb: np.ndarray, window: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Return the reported depth along the inclined camera's axis, for the colours `rgb` of the network's input."""
         at = np.arange(INPUT_SIZE, dtype=np.float32) + np.float32(0.5)
         along = window[2, 0] * at[None, :] + window[2, 1] * at[:, None] + window[2, 2]
         turned = self._warp(depth, window, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT) / along.astype(np.float32)
-        return DepthSensor(DepthConfig(), self._camera.hfov).corrupt(turned, rng)
+        nowhere = np.zeros(turned.shape, np.uint8)
+        seed = int(rng.integers(1 << 63))
+        return self._sensor.corrupt(RGBDFrame(rgb, turned, nowhere), seed).depth
 
 
 def _draw_outfit(rng: np.random.Generator) -> Outfit:

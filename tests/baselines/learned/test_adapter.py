@@ -13,7 +13,9 @@ from baselines.learned.estimates import BatchFilter
 CORRIDOR, INDOOR = follow_env.IDS["corridor"], follow_env.IDS["indoor"]
 
 
-def batch(id_: str, worlds: int, mode: AutoresetMode = AutoresetMode.SAME_STEP, **settings: object) -> gym.vector.VectorEnv:
+def batch(
+    id_: str, worlds: int, mode: AutoresetMode = AutoresetMode.SAME_STEP, **settings: object
+) -> gym.vector.VectorEnv:
     return gym.make_vec(id_, num_envs=worlds, autoreset_mode=mode, **settings)
 
 
@@ -67,7 +69,7 @@ def test_filters_belong_to_their_batch() -> None:
 
 def test_a_batch_that_resets_a_step_later_is_refused() -> None:
     late = batch(CORRIDOR, 2, AutoresetMode.NEXT_STEP)
-    with pytest.raises(ValueError, match="make it with autoreset_mode=AutoresetMode.SAME_STEP"):
+    with pytest.raises(ValueError, match=r"make it with autoreset_mode=AutoresetMode\.SAME_STEP"):
         FollowVecEnv([late])
     late.close()
 

@@ -79,8 +79,9 @@ def test_an_inclined_picture_shows_what_a_turned_camera_would() -> None:
     direct = source._warp(turned.ids, crop, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT)
     assert (direct > 0).sum() > 500
     assert (warped != direct).mean() < 0.01
-    depth = source._sensed(straight.depth, turn @ crop, rng)
-    same = source._sensed(turned.depth, crop, rng)
+    grey = np.full((300, 300, 3), 128, np.uint8)
+    depth = source._sensed(straight.depth, grey, turn @ crop, rng)
+    same = source._sensed(turned.depth, grey, crop, rng)
     both = (depth > 0) & (same > 0) & (np.abs(depth - same) < 0.3)
     assert both.mean() > 0.5
     assert np.abs(np.median((depth - same)[both])) < 0.01

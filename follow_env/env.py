@@ -396,7 +396,7 @@ class FollowEnv(gymnasium.Env):
         if self._obs == "rgbd_uint8":
             from follow_env.camera.sensor import packed
 
-            return packed(self.observed)
+            return packed(self.observed.rgb, self.observed.depth)
         twist = np.array(self._twist, np.float32)
         observation = {"rgb": self.observed.rgb, "depth": self.observed.depth, "twist": twist}
         if self._obs == "rgbd_box":

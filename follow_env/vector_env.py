@@ -15,6 +15,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from follow_env.camera.raster_kernels import announced
+from follow_env.camera.sensor import packed
 from follow_env.config import RobotConfig, choose
 from follow_env.env import FollowEnv, _pose
 from follow_env.person.bodies import load_body
@@ -23,7 +24,7 @@ from follow_env.routes import ROUTES, Route, make_route
 from follow_env.vector.episode import CHEST_HEIGHT
 from follow_env.vector.kernels import BEGIN, SKIP, STEP, play
 from follow_env.vector.philox import keys
-from follow_env.vector.pictures import Artist, Pictures, near_bytes
+from follow_env.vector.pictures import Artist, Pictures
 from follow_env.vector.place import pack_place
 from follow_env.vector.records import COLLISIONS, INFO, MOST_TURNS, ROUTE_NUMBERS, WORLD, pack_settings
 
@@ -97,7 +98,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
                 self._pictures = Pictures(num_envs, single.camera, single._delay)
                 body = load_body(*single._dressed)
                 for _ in self._picture_ranges:
-                    artist = Artist(single.scene, single.camera, single.robot_config, single._sensor.depth, body)
+                    artist = Artist(single.scene, single.camera, single.robot_config, single._sensor, body)
                     artist.draw(self._worlds[0])  # compiles what it needs, before threads meet there
                     self._artists.append(artist)
         most = max(len(self._ranges), len(self._artists))
@@ -202,7 +203,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         rgb, depth = self._pictures.observed(self._worlds)
         if self._single._obs == "rgbd_uint8":
             info |= {"depth": depth, "_depth": mask}
-            return np.concatenate((rgb, near_bytes(depth)[..., None]), axis=-1), info
+            return packed(rgb, depth), info
         return {"rgb": rgb, "depth": depth, "twist": infos["twist"].astype(np.float32)}, info
 
     def _outcome(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -112,10 +112,14 @@ class RGBDSensor:
         return RGBDFrame(rgb, depth, frame.ids)
 
 
-def packed(frame: RGBDFrame) -> np.ndarray:
-    """Return colour and nearness as one (H, W, 4) uint8: 255 (1 - z / 8 m), 0 = no reading or beyond."""
-    out = np.empty((*frame.depth.shape, 4), np.uint8)
-    pack_bytes(frame.rgb, frame.depth, out)
+def packed(rgb: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    """Return colours (..., H, W, 3) and depths (..., H, W) as one (..., H, W, 4) uint8.
+
+    The fourth is nearness: 255 (1 - z / 8 m), 0 = no reading or beyond.
+    """
+    out = np.empty((*depth.shape, 4), np.uint8)
+    rows = (-1, depth.shape[-1])
+    pack_bytes(rgb.reshape(*rows, 3), depth.reshape(rows), out.reshape(*rows, 4))
     return out
 
 

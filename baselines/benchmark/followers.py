@@ -13,7 +13,7 @@ from baselines.benchmark.episodes import EpisodeFunction
 from baselines.benchmark.files import Value, write_csv, write_text
 from baselines.benchmark.metrics import Row
 from baselines.benchmark.report import markdown_table
-from baselines.benchmark.running import TIMING_COLUMNS, rows, run, timings
+from baselines.benchmark.running import Played, rows, run
 from baselines.benchmark.statistics import Score
 from baselines.benchmark.store import Store
 from baselines.learned.agents import load_agent, shipped, weights_file
@@ -80,15 +80,14 @@ def bench(
     )
     tasks = [(cell, seed) for cell, seeds in plan.items() for seed in seeds]
 
-    def write(store: Store) -> str:
+    def write(store: Store) -> tuple[str, Played]:
         played = {cell: [store.episode(cell, seed) for seed in seeds] for cell, seeds in plan.items()}
         write_csv(out / "episodes.csv", metrics.COLUMNS, rows(played))
-        write_csv(out / "timing.csv", TIMING_COLUMNS, timings(played))
         found = records({cell: [one.row for one in group] for cell, group in played.items()})
         write_csv(out / "followers.csv", COLUMNS, found, _DIGITS)
         text = report(found)
         write_text(out / "followers.md", text)
-        return text
+        return text, played
 
     return run(tasks, digest, config, episode, write, out, jobs, resume)
 

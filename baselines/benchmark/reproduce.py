@@ -12,7 +12,7 @@ from baselines.benchmark.curves import CURVE_COLUMNS, curve_records
 from baselines.benchmark.episodes import EpisodeFunction
 from baselines.benchmark.files import write_csv, write_text
 from baselines.benchmark.report import report
-from baselines.benchmark.running import TIMING_COLUMNS, rows, run, timings
+from baselines.benchmark.running import Played, rows, run
 from baselines.benchmark.store import Store
 from baselines.benchmark.studies import FAMILY_COLUMNS, SENSITIVITY_COLUMNS, Record, study_records
 from baselines.benchmark.table1 import COLUMNS, Table1
@@ -43,12 +43,11 @@ def reproduce(
     return run(plan.tasks(), digest, config, episode, lambda store: _write(plan, store, out), out, jobs, resume)
 
 
-def _write(plan: Plan, episodes: Store, out: Path) -> str:
+def _write(plan: Plan, episodes: Store, out: Path) -> tuple[str, Played]:
     """Every table and figure, from exactly the planned seeds, in the plan's order."""
     (out / FIGURES).mkdir(exist_ok=True)
     table = {cell: [episodes.episode(cell, seed) for seed in plan.table_seeds(cell)] for cell in plan.table}
     write_csv(out / "episodes.csv", metrics.COLUMNS, rows(table))
-    write_csv(out / "timing.csv", TIMING_COLUMNS, timings(table))
     curves = curve_records({cell: [played.curve for played in group] for cell, group in table.items()})
     write_csv(out / "curves.csv", CURVE_COLUMNS, curves, _DIGITS)
     drawn = figures.draw_curves(curves, out / FIGURES)
@@ -69,4 +68,4 @@ def _write(plan: Plan, episodes: Store, out: Path) -> str:
     text = report(measured, rules)
     pictures = "\n\n".join(f"![{path.stem.replace('_', ' ')}]({FIGURES}/{path.name})" for path in drawn)
     write_text(out / "table1.md", f"{text}\n## Figures\n\n{pictures}\n")
-    return text
+    return text, table

@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 import contextlib
+import math
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from baselines.benchmark import store
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.episodes import Episode, EpisodeFunction
-from baselines.benchmark.files import Value, write_text
+from baselines.benchmark.files import Value, write_csv, write_text
 from baselines.benchmark.metrics import Row
 from baselines.benchmark.pool import Task, play_all
 from baselines.benchmark.progress import progress
+from baselines.benchmark.report import markdown_table
 from baselines.benchmark.store import InputError, Store
 
 CONFIG = "config.json"
 _RESULTS = (CONFIG, "table1.csv", "table1.md", "followers.csv", "followers.md", "episodes.csv")
-TIMING_COLUMNS = ("cell", "seed", "policy_step_mean_s", "policy_step_p95_s")
+_TIMING_COLUMNS = (
+    *("cell", "seed", "policy_step_mean_s", "policy_step_p95_s"),
+    *("environment_step_mean_s", "metrics_step_mean_s"),
+)
+
+
+Played = Mapping[Cell, Sequence[Episode]]
+"""Episodes of each cell in the order of their seeds, which begin at 0."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -29,7 +39,7 @@ def run(
     digest: str,
     config: str,
     episode: EpisodeFunction,
-    write: Callable[[Store], str],
+    write: Callable[[Store], tuple[str, Played]],
     out: Path,
     jobs: int,
     resume: bool,
@@ -41,7 +51,8 @@ def run(
         digest: Hash of all that episodes in one folder must share.
         config: Text of ``config.json``.
         episode: Plays one cell and seed; picklable when several jobs are used.
-        write: Writes tables and figures from the finished episodes and returns the report.
+        write: Writes tables and figures from the finished episodes; returns the report and the episodes of its table,
+            whose costs `timing.csv` and `timing.md` then hold.
         out: Results folder; made when missing.
         jobs: Number of processes. The results do not depend on it.
         resume: Whether to go on with the episodes that the folder already holds.
@@ -64,9 +75,14 @@ def run(
         try:
             with _writable(out):
                 write_text(out / CONFIG, config)
+            began, missing = time.perf_counter(), len(_missing(tasks, episodes))
             _play_missing(tasks, episode, episodes, jobs)
+            spent = time.perf_counter() - began
             with _writable(out):
-                return write(episodes)
+                text, table = write(episodes)
+                done = f"{missing} episodes played in {spent:.0f} s by {jobs} process{'es' if jobs > 1 else ''}."
+                _write_timing(out, table, done)
+            return text
         except KeyboardInterrupt:
             kept = len(tasks) - len(_missing(tasks, episodes))
             raise Interrupted(
@@ -75,18 +91,30 @@ def run(
             ) from None
 
 
-def rows(played: Mapping[Cell, Sequence[Episode]]) -> list[Row]:
+def rows(played: Played) -> list[Row]:
     """The episodes' rows in the order of the cells."""
     return [episode.row for group in played.values() for episode in group]
 
 
-def timings(played: Mapping[Cell, Sequence[Episode]]) -> list[dict[str, Value]]:
-    """One record of TIMING_COLUMNS for each episode."""
-    return [
-        dict(zip(TIMING_COLUMNS, (cell.key, seed, episode.timing.mean, episode.timing.p95), strict=True))
-        for cell, group in played.items()
-        for seed, episode in enumerate(group)
+def _write_timing(out: Path, played: Played, done: str) -> None:
+    """Write what each episode cost, and the mean cost of a step by stage."""
+    records: list[dict[str, Value]] = []
+    stages: dict[tuple[str, str], list[tuple[float, float, float]]] = {}
+    for cell, group in played.items():
+        stages.setdefault((cell.perception, cell.controller), []).extend(
+            (one.timing.environment, one.timing.mean, one.timing.metrics) for one in group
+        )
+        for seed, one in enumerate(group):
+            timing = (one.timing.mean, one.timing.p95, one.timing.environment, one.timing.metrics)
+            records.append(dict(zip(_TIMING_COLUMNS, (cell.key, seed, *timing), strict=True)))
+    write_csv(out / "timing.csv", _TIMING_COLUMNS, records)
+    lines = [
+        [*key, *(f"{1e3 * math.fsum(one[k] for one in costs) / len(costs):.3f}" for k in range(3))]
+        for key, costs in stages.items()
     ]
+    header = ["perception", "policy", "environment (ms)", "policy (ms)", "metrics (ms)"]
+    text = "Mean cost of a step, by the wall clock of the processes that shared the machine:"
+    write_text(out / "timing.md", f"{done}\n\n{text}\n\n{markdown_table(header, lines, left=2)}\n")
 
 
 def _claim(out: Path) -> None:

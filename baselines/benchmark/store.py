@@ -7,6 +7,7 @@ and lets several processes write to one store.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sqlite3
 import zlib
@@ -91,7 +92,7 @@ class Store:
         """
         row = json.dumps(episode.row, allow_nan=False)
         curve = zlib.compress(np.ascontiguousarray(episode.curve, dtype="<f8").tobytes())
-        timing = json.dumps([episode.timing.mean, episode.timing.p95], allow_nan=False)
+        timing = json.dumps(dataclasses.astuple(episode.timing), allow_nan=False)
         checksum = _sum(cell.key.encode(), seed, row.encode(), curve, timing.encode())
         with self._explained():
             self._connection.execute(

@@ -1,10 +1,11 @@
-"""`follow speed`: what frames, steps, resets and the physics cost here, each beside a peer measured in the same run."""
+"""`follow speed`: what frames, steps, resets, batches and the physics cost here, each beside a peer of the same run."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from baselines.speed.batch import BatchRate, measure_batches
 from baselines.speed.frames import FrameCost, measure_frames
 from baselines.speed.pair import Gain, measure_gains
 from baselines.speed.solver import SolverCost, measure_solver
@@ -23,6 +24,7 @@ class Effort:
         rounds: Times that one and two processes are let run.
         seconds: Time of one such run, s.
         sizes: Pictures (width, height), px.
+        batches: Numbers of worlds that are stepped at once.
     """
 
     frames: int = 200
@@ -31,10 +33,11 @@ class Effort:
     rounds: int = 5
     seconds: float = 0.4
     sizes: tuple[tuple[int, int], ...] = ((640, 480), (320, 240), (160, 120), (84, 84))
+    batches: tuple[int, ...] = (1, 64, 1024, 4096, 65536)
 
 
 FULL = Effort()
-QUICK = Effort(frames=20, steps=100, resets=20, rounds=3, seconds=0.1)
+QUICK = Effort(frames=20, steps=100, resets=20, rounds=3, seconds=0.1, batches=(1, 64, 4096))
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,7 @@ class Report:
         gains: Frames in one and in two processes.
         steps: Steps and resets.
         solver: The physics with few and many solver iterations.
+        batches: Many worlds at once.
     """
 
     unavailable: dict[str, str]
@@ -54,6 +58,7 @@ class Report:
     gains: list[Gain]
     steps: list[StepCost]
     solver: list[SolverCost]
+    batches: list[BatchRate]
 
 
 def speed(effort: Effort = FULL, tell: Callable[[str], object] = lambda what: None) -> Report:
@@ -77,4 +82,6 @@ def speed(effort: Effort = FULL, tell: Callable[[str], object] = lambda what: No
         frames += costs
     tell("two processes")
     gains = measure_gains(list(dict.fromkeys(c.renderer for c in frames)), effort.sizes, effort.rounds, effort.seconds)
-    return Report(unavailable, frames, gains, steps, solver)
+    tell("many worlds at once")
+    batches = measure_batches(effort.batches, effort.rounds, effort.seconds)
+    return Report(unavailable, frames, gains, steps, solver, batches)

@@ -9,6 +9,7 @@ import json
 from baselines.benchmark.configuration import machine, packages
 from baselines.benchmark.report import markdown_table
 from baselines.speed import Report
+from baselines.speed.batch import BatchRate
 from baselines.speed.frames import FrameCost
 from baselines.speed.pair import Gain
 from baselines.speed.solver import SolverCost
@@ -26,6 +27,7 @@ def table(report: Report) -> str:
         ("Frames of one process", [_frames(report.frames), *missing]),
         ("Frames of two processes, and what a loop that only computes gains from the second", [_gains(report.gains)]),
         ("Steps and resets", [_steps(report.steps)]),
+        ("Many worlds at once", [_batches(report.batches)]),
         ("Iterations of the contact solver, against the differential-drive equations", [_solver(report.solver)]),
     ]
     return "\n\n".join(f"## {title}\n\n" + "\n\n".join(parts) for title, parts in sections)
@@ -73,6 +75,18 @@ def _steps(costs: list[StepCost]) -> str:
         for c in costs
     ]
     return markdown_table(header, rows, left=2)
+
+
+def _batches(rates: list[BatchRate]) -> str:
+    header = ("what", "worlds", "steps/s (median)", "steps/s (fastest)", "of CartPole's")
+    rows = [
+        (
+            *(r.what, f"{r.worlds:,}", f"{r.median:,.0f}", f"{r.fastest:,.0f}"),
+            "–" if r.peer is None else f"{r.median / r.peer:.2f} x",
+        )
+        for r in rates
+    ]
+    return markdown_table(header, rows, left=1)
 
 
 def _solver(costs: list[SolverCost]) -> str:

@@ -10,6 +10,7 @@ import pytest
 
 from baselines import cli, speed
 from baselines.speed import frames, pair, timing
+from baselines.speed.batch import PEER, BatchRate
 from baselines.speed.frames import FrameCost
 from baselines.speed.pair import Gain, Rates
 from baselines.speed.solver import ITERATIONS, SolverCost
@@ -21,7 +22,7 @@ from follow_env.camera import RENDERERS
 from follow_env.physics import SOLVER_ITERATIONS
 
 SIZE = (48, 36)
-LEAST = speed.Effort(frames=2, steps=2, resets=2, rounds=1, seconds=0.01, sizes=(SIZE,))
+LEAST = speed.Effort(frames=2, steps=2, resets=2, rounds=1, seconds=0.01, sizes=(SIZE,), batches=(3,))
 
 
 def cost(median: float, cpu_median: float) -> Cost:
@@ -33,6 +34,7 @@ BY_HAND = speed.Report(
     frames=[FrameCost("raster", "skinned", 320, 240, cost(0.002, 0.001), cost(0.03, 0.02))],
     gains=[Gain("raster", 320, 240, Rates(500.0, 510.0, 800.0, 918.0), Rates(100.0, 100.0, 200.0, 200.0))],
     steps=[StepCost("corridor", "reset", cost(0.0005, 0.0005), cost(0.0002, 0.0001))],
+    batches=[BatchRate("FollowVectorEnv", 4096, 3e6, 4e6, 1e7), BatchRate(PEER, 4096, 1e7, 2e7, None)],
     solver=[
         SolverCost(SOLVER_ITERATIONS, 0.001, 0.002, 0.003, cost(0.0002, 0.0002)),
         SolverCost(50, 0.0005, 0.001, 0.002, cost(0.0003, 0.0003)),
@@ -58,6 +60,18 @@ def test_every_renderer_picture_step_and_count_of_iterations_has_a_row(report: s
         assert names[-1] == "reset"
         assert len(names) == len(set(names)) == 6
     assert [c.iterations for c in report.solver] == list(ITERATIONS)
+
+
+def test_batches_stand_beside_their_peers(report: speed.Report) -> None:
+    assert {r.worlds for r in report.batches if r.peer is not None} == {3}
+    (peer,) = [r for r in report.batches if r.what == PEER]
+    assert [r.peer for r in report.batches if r.worlds == 3] == [peer.median, peer.median, None]
+    assert sum("84x84" in r.what for r in report.batches) == sum("of FollowEnv" in r.what for r in report.batches) == 2
+    assert all(0.0 < r.median <= r.fastest < math.inf for r in report.batches)
+    assert (
+        "| FollowVectorEnv                 |  4,096 |        3,000,000 |         4,000,000 |        0.30 x |"
+        in table(BY_HAND)
+    )
 
 
 def test_all_costs_are_times(report: speed.Report) -> None:

@@ -25,7 +25,7 @@ CELL = Cell("emulated", "indoor", "akf")
 def episode(seed: int) -> Episode:
     generator = np.random.default_rng(seed)
     row = {"scene": "indoor", "seed": seed, "angle_rmse_rad": float(generator.normal()), "path_ratio": None}
-    return Episode(row, generator.normal(size=(400, 3)).cumsum(axis=0), Timing(1e-4, 2e-4))
+    return Episode(row, generator.normal(size=(400, 3)).cumsum(axis=0), Timing(1e-4, 2e-4, 3e-4, 4e-5))
 
 
 def fill(folder: Path, count: int) -> None:

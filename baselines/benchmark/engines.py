@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from baselines.benchmark.assembly import driver, environment, environment_kwargs
 from baselines.benchmark.cells import SCENES, Cell
 from baselines.benchmark.episodes import play
+from baselines.benchmark.explain import NAMES
 from baselines.benchmark.metrics import EpisodeMetrics, Row
 from baselines.benchmark.report import markdown_table
 from baselines.benchmark.statistics import Difference, PooledError
@@ -104,17 +105,17 @@ def report(episodes: int = 100, scenes: Iterable[str] = SCENES) -> str:
         result = motion(scene, seeds)
         grown = [f"{1000.0 * p:.1f} mm, {math.degrees(a):.3f}°" for _, p, a in result.growth]
         opened.append([scene, f"{1000.0 * result.position:.1f} mm, {math.degrees(result.yaw):.3f}°", *grown])
-        for row in following(scene, seeds):
-            low, high = row.ratio.interval or (math.nan, math.nan)
-            ratio = f"{row.ratio.value:.4f} [{low:.4f}, {high:.4f}]"
-            closed.append([scene, row.quantity, f"{row.physics:.4g}", ratio, f"{row.same_end:.3f}"])
+        for estimator in ("none", "kf", "akf"):
+            for row in following(scene, seeds, estimator):
+                low, high = row.ratio.interval or (math.nan, math.nan)
+                both = (row.physics, row.physics * row.ratio.value)
+                ratio = f"{row.ratio.value:.4f} ({low:.4f} to {high:.4f})"
+                same = f"{row.same_end:.0%}"
+                closed.append([scene, row.quantity, NAMES[estimator], *(f"{v:.4g}" for v in both), ratio, same])
+    closed.sort(key=lambda line: (line[0], list(_POOLS).index(line[1])))
     columns = ["scene", f"windows of {WINDOW:g} s", *(f"after {t:g} s" for t in GROWTH)]
-    return "\n".join(
-        (
-            markdown_table(columns, opened, left=1),
-            markdown_table(["scene", "RMSE of", "PyBullet", "kinematic over PyBullet", "same end"], closed, left=2),
-        )
-    )
+    header = ["scene", "RMSE of", "estimator", "PyBullet", "kinematic", "kinematic over PyBullet", "same end"]
+    return "\n\n".join((markdown_table(columns, opened, left=1), markdown_table(header, closed, left=3)))
 
 
 def _tracking(column: str, scale: float, rows: Sequence[Row]) -> PooledError:

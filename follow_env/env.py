@@ -12,7 +12,8 @@ from gymnasium import spaces
 from follow_env.camera import RENDERERS, CameraPose, PinholeCamera, Renderer, RGBDFrame, make_renderer
 from follow_env.camera.mesh import Placed
 from follow_env.config import CameraConfig, RobotConfig, SensorConfig, build, choose, sensor_config
-from follow_env.measurement import GaussMarkov, MeasurementModel
+from follow_env.measurement import MeasurementModel
+from follow_env.observations import MAX_DISTANCE, OBSERVATIONS, observation_space
 from follow_env.person.bodies import BODIES, OUTFITS, load_body
 from follow_env.person.walker import Walker
 from follow_env.physics import PERSON_RADIUS, PHYSICS_HZ, World
@@ -29,15 +30,13 @@ from follow_env.scenes import make_scene
 from follow_env.view import Dashboard, import_pygame, show_window
 
 if TYPE_CHECKING:
-    from follow_env.camera.sensor import RGBDSensor
+    from follow_env.sensing import RGBDSensing
 
-OBSERVATIONS = ("measurement", "state", "rgbd", "rgbd_box", "rgbd_uint8")
 ACTIONS = ("twist", "wheels")
 SETTINGS = (
     *("scene", "obs", "action", "route", "sensor", "camera", "robot", "renderer", "light", "control_hz", "latency_s"),
     *("person", "outfit", "render_mode"),
 )
-MAX_DISTANCE = 20.0
 LOST_AFTER = 5.0
 """The episode ends when the person was out of view for longer than this, s."""
 HALF_TRUNK = 0.16
@@ -144,16 +143,16 @@ class FollowEnv(gymnasium.Env):
         self.robot_config = build("robot", RobotConfig(), robot)
         self.camera = PinholeCamera(build("camera", CameraConfig(), camera))
         self._half_field = math.tan(0.5 * self.camera.hfov)
-        self._sensor = self._sensor_in_use = sensor_config(sensor)
+        self._sensor = sensor_config(sensor)
         self.scene = make_scene(scene, light)
         self._world: World | None = None
         self._renderer: Renderer | None = None
         self._dashboard: Dashboard | None = None
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
-        self.observation_space = self._make_observation_space()
+        self.observation_space = observation_space(self._obs, self.camera, self.robot_config)
         self._route: Route | None = None
         self.observed: RGBDFrame | None = None
-        self._rgbd_sensor: RGBDSensor | None = None
+        self._sensing: RGBDSensing | None = None
         self._dressed = (self._person, self._outfit)
         self._walker: Walker | None = None
 
@@ -293,40 +292,16 @@ class FollowEnv(gymnasium.Env):
                 part.close()
         self._world = self._renderer = self._route = None
 
-    def _make_observation_space(self) -> spaces.Space:
-        height, width = self.camera.height, self.camera.width
-        robot = self.robot_config
-        twist = (1.5 * robot.max_wheel_speed, 3.0 * robot.max_wheel_speed / robot.track_width)
-        if self._obs in ("measurement", "state"):
-            own = (*twist, 1.0, 1.0)
-            if self._obs == "measurement":
-                high, low = (math.pi, MAX_DISTANCE, 1.0, 600.0, *own), (-math.pi, 0.0, 0.0, 0.0)
-            else:
-                high, low = (math.pi, MAX_DISTANCE, 5.0, 5.0, *own), (-math.pi, -MAX_DISTANCE, -5.0, -5.0)
-            return spaces.Box(
-                np.array((*low, *(-value for value in own)), np.float32), np.array(high, np.float32), dtype=np.float32
-            )
-        if self._obs == "rgbd_uint8":
-            return spaces.Box(0, 255, (height, width, 4), np.uint8)
-        parts: dict[str, spaces.Space] = {
-            "rgb": spaces.Box(0, 255, (height, width, 3), np.uint8),
-            "depth": spaces.Box(0.0, self.camera.config.far, (height, width), np.float32),
-            "twist": spaces.Box(-np.array(twist, np.float32), np.array(twist, np.float32), dtype=np.float32),
-        }
-        if self._obs == "rgbd_box":
-            parts["box"] = spaces.Box(0.0, np.array((width, height, width, height), np.float32), (4,), np.float32)
-        return spaces.Dict(parts)
-
     def _set_up_sensors(self, sensor: SensorConfig) -> None:
         self._measurement = MeasurementModel(sensor.measurement, self.dt)
-        self._latest: tuple[RGBDFrame, float] | None = None
-        if self._obs.startswith("rgbd") and (self._rgbd_sensor is None or sensor != self._sensor_in_use):
-            from follow_env.camera.sensor import RGBDSensor  # compiled: only for those who look at pictures
-
-            self._rgbd_sensor = RGBDSensor(sensor.depth, sensor.colour, self.camera)
-        self._sensor_in_use = sensor
-        self._box_error = GaussMarkov(4, sensor.box.correlation_s, self.dt)
         self._queue: deque[Any] = deque()
+        if not self._obs.startswith("rgbd"):
+            return
+        if self._sensing is None or self._sensing.config != sensor:
+            from follow_env.sensing import RGBDSensing  # compiled: only for those who look at pictures
+
+            self._sensing = RGBDSensing(sensor, self.camera, self.dt, boxes=self._obs == "rgbd_box")
+        self._sensing.restart()
 
     def _look(self) -> None:
         """Update the truth: poses, bearing, distance, visibility and what is counted from them."""
@@ -388,7 +363,8 @@ class FollowEnv(gymnasium.Env):
             self._last_measured = self.time - age
             bearing = min(max(seen[0], -math.pi), math.pi)
             return np.array((bearing, min(seen[1], MAX_DISTANCE), 1.0, age, *own), np.float32)
-        seen = self._delayed(self._sense())
+        assert self._sensing is not None
+        seen = self._delayed(self._sensing.sense(self.frame, self.time, self.np_random))
         if seen is None:
             first, _, taken = self._queue[0]
             seen = first, np.zeros(4, np.float32), taken
@@ -402,45 +378,6 @@ class FollowEnv(gymnasium.Env):
         if self._obs == "rgbd_box":
             observation["box"] = box
         return observation
-
-    def _sense(self) -> tuple[RGBDFrame, np.ndarray, float]:
-        """Return the latest frame with sensor errors, the person's jittered box (zeros if not detected) and its time.
-
-        A dropped frame is not drawn at all. The count of random numbers does not depend on what is seen.
-        """
-        assert self._rgbd_sensor is not None
-        seed = int(self.np_random.integers(1 << 64, dtype=np.uint64))
-        dropped = float(self.np_random.random()) < self._sensor_in_use.frames.drop_share
-        errors = self._box_error.step(self.np_random)
-        if dropped and self._latest is not None:
-            frame, taken = self._latest
-            return _copy(frame), np.zeros(4, np.float32), taken
-        truth = self.frame()
-        frame = self._rgbd_sensor.corrupt(truth, seed)
-        if self._sensor_in_use.frames.drop_share > 0.0:
-            self._latest = _copy(frame), self.time  # the caller may write into what was observed
-        box = self._jittered_box(truth, errors) if self._obs == "rgbd_box" else np.zeros(4, np.float32)
-        return frame, box, self.time
-
-    def _jittered_box(self, truth: RGBDFrame, errors: list[float]) -> np.ndarray:
-        config = self._sensor_in_use.box
-        tight = truth.person_box(config.min_pixels)
-        if tight is None:
-            return np.zeros(4, np.float32)
-        u0, v0, u1, v1 = tight
-        width, height = u1 - u0, v1 - v0
-        u = 0.5 * (u0 + u1) + config.centre_jitter * errors[0] * width
-        v = 0.5 * (v0 + v1) + config.centre_jitter * errors[1] * height
-        half_w = 0.5 * width * max(1.0 + config.size_jitter * errors[2], 0.2)
-        half_h = 0.5 * height * max(1.0 + config.size_jitter * errors[3], 0.2)
-        limit_u, limit_v = float(self.camera.width), float(self.camera.height)
-        corners = (
-            min(max(u - half_w, 0.0), limit_u),
-            min(max(v - half_h, 0.0), limit_v),
-            min(max(u + half_w, 0.0), limit_u),
-            min(max(v + half_h, 0.0), limit_v),
-        )
-        return np.array(corners, np.float32)
 
     def _delayed(self, value: Any) -> Any:
         """Return what was seen `latency_s` ago, or None while that was before the start."""
@@ -488,10 +425,6 @@ class FollowEnv(gymnasium.Env):
         self._dashboard.update(info, self.observed or self.frame())
         if self.render_mode == "human":
             show_window(self._dashboard.image(), 1.0 / self.dt)
-
-
-def _copy(frame: RGBDFrame) -> RGBDFrame:
-    return RGBDFrame(frame.rgb.copy(), frame.depth.copy(), frame.ids)
 
 
 def _pose(value: Any) -> tuple[float, float, float]:

@@ -6,7 +6,8 @@ import math
 import numpy as np
 from numba import njit
 
-from follow_env.env import HALF_TRUNK, LOST_AFTER, MAX_DISTANCE
+from follow_env.env import HALF_TRUNK, LOST_AFTER
+from follow_env.observations import MAX_DISTANCE
 from follow_env.physics import PERSON_RADIUS
 from follow_env.reward import BAND_BEARING, BAND_DISTANCE, SET_POINT, SUCCESS_BAND_SHARE, SUCCESS_OUT_OF_VIEW
 from follow_env.vector.drive import limit, roll

@@ -1,0 +1,38 @@
+"""The observation modes of the environments and their spaces."""
+
+import math
+
+import numpy as np
+from gymnasium import spaces
+
+from follow_env.camera import PinholeCamera
+from follow_env.config import RobotConfig
+
+OBSERVATIONS = ("measurement", "state", "rgbd", "rgbd_box", "rgbd_uint8")
+MAX_DISTANCE = 20.0
+"""Largest distance that an observation can hold, m."""
+
+
+def observation_space(obs: str, camera: PinholeCamera, robot: RobotConfig) -> spaces.Space:
+    """Return the space of an observation mode (see `FollowEnv`)."""
+    height, width = camera.height, camera.width
+    twist = (1.5 * robot.max_wheel_speed, 3.0 * robot.max_wheel_speed / robot.track_width)
+    if obs in ("measurement", "state"):
+        own = (*twist, 1.0, 1.0)
+        if obs == "measurement":
+            high, low = (math.pi, MAX_DISTANCE, 1.0, 600.0, *own), (-math.pi, 0.0, 0.0, 0.0)
+        else:
+            high, low = (math.pi, MAX_DISTANCE, 5.0, 5.0, *own), (-math.pi, -MAX_DISTANCE, -5.0, -5.0)
+        return spaces.Box(
+            np.array((*low, *(-value for value in own)), np.float32), np.array(high, np.float32), dtype=np.float32
+        )
+    if obs == "rgbd_uint8":
+        return spaces.Box(0, 255, (height, width, 4), np.uint8)
+    parts: dict[str, spaces.Space] = {
+        "rgb": spaces.Box(0, 255, (height, width, 3), np.uint8),
+        "depth": spaces.Box(0.0, camera.config.far, (height, width), np.float32),
+        "twist": spaces.Box(-np.array(twist, np.float32), np.array(twist, np.float32), dtype=np.float32),
+    }
+    if obs == "rgbd_box":
+        parts["box"] = spaces.Box(0.0, np.array((width, height, width, height), np.float32), (4,), np.float32)
+    return spaces.Dict(parts)

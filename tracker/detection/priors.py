@@ -16,8 +16,10 @@ VARIANCES = (0.1, 0.2)
 """Divisors of the coded centre and of the coded size (SSD)."""
 MATCH_OVERLAP = 0.5
 """Least overlap at which a prior has to find a person (paper A, figure 8; SSD)."""
+NEAR_OVERLAP = 0.4
+"""Least overlap at which a prior may find a person: what it says then is suppressed by the better ones anyway."""
 POSITIVE, NEGATIVE, IGNORED = 1, 0, -1
-"""Labels of priors: person, background, neither (the person is too hard to see to be asked for or to be denied)."""
+"""Labels of priors: person, background, neither (it overlaps a person a little too little, or one too hard to see)."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,8 @@ def match(boxes: np.ndarray, difficult: np.ndarray, priors: np.ndarray) -> tuple
 
     As SSD: the best pair of a person and a prior is joined, then the best of what is left, until every person has a
     prior of its own; then each prior that overlaps a person by `MATCH_OVERLAP` takes the one it overlaps most. The
-    first step matters here: beyond 3.8 m no prior of paper A reaches that overlap with an adult.
+    first step matters here: beyond 3.8 m no prior of paper A reaches that overlap with an adult. Unlike in SSD, a prior
+    between `NEAR_OVERLAP` and that is ignored: those were nearly all of the hardest negatives, and taught little else.
 
     Args:
         boxes: (N, 4) people, corners.
@@ -132,7 +135,9 @@ def match(boxes: np.ndarray, difficult: np.ndarray, priors: np.ndarray) -> tuple
         return labels, offsets
     overlaps = iou(boxes, to_corners(priors))
     owner = overlaps.argmax(axis=0)
-    owned = overlaps.max(axis=0) >= MATCH_OVERLAP
+    best = overlaps.max(axis=0)
+    owned = best >= MATCH_OVERLAP
+    labels[best >= NEAR_OVERLAP] = IGNORED
     overlaps = np.where(difficult[:, None], -1.0, overlaps)  # these need no prior of their own
     for _ in range(int((~difficult).sum())):
         person, prior = divmod(int(overlaps.argmax()), len(priors))

@@ -37,7 +37,7 @@ class DataConfig:
     Attributes:
         people: most people in a picture.
         empty_share: share of pictures without anybody.
-        nearest, farthest: distance of the people, m; its logarithm is uniform.
+        nearest, farthest: distance of the people, m; half of them are nearer than 2.5 m by default.
         lowest, highest: height of the camera, m.
         pitch_deg, roll_deg: largest inclination of the camera, degrees.
         zoom: largest enlargement of a crop.
@@ -161,7 +161,7 @@ class SampleSource:
         count = 0 if rng.random() < config.empty_share else 1 + int(config.people * rng.random() ** 2)
         spots: list[tuple[float, float]] = []
         for _ in range(8 * count):
-            distance = config.nearest * (config.farthest / config.nearest) ** rng.random()
+            distance = config.nearest + (config.farthest - config.nearest) * rng.random() ** 1.5
             bearing = yaw + rng.uniform(-0.55, 0.55)
             spot = (x + distance * math.cos(bearing), y + distance * math.sin(bearing))
             apart = all(math.dist(spot, other) > 0.45 for other in spots)

@@ -5,6 +5,7 @@ Everything is in shares of the picture: u and v from 0 to 1. "Corners" are (u0, 
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +17,10 @@ VARIANCES = (0.1, 0.2)
 """Divisors of the coded centre and of the coded size (SSD)."""
 MATCH_OVERLAP = 0.5
 """Least overlap at which a prior has to find a person (paper A, figure 8; SSD)."""
+NEAR_OVERLAP = 0.4
+"""Least overlap at which a prior may find a person: what it says then is suppressed by the better ones anyway."""
 POSITIVE, NEGATIVE, IGNORED = 1, 0, -1
-"""Labels of priors: person, background, neither (the person is too hard to see to be asked for or to be denied)."""
+"""Labels of priors: person, background, neither (it overlaps a person a little too little, or one too hard to see)."""
 
 
 @dataclass(frozen=True)
@@ -108,12 +111,27 @@ def decode(offsets: np.ndarray, priors: np.ndarray) -> np.ndarray:
     return to_corners(np.concatenate([centres, priors[:, 2:] * np.exp(VARIANCES[1] * offsets[:, 2:])], axis=1))
 
 
-def match(boxes: np.ndarray, difficult: np.ndarray, priors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return what every prior has to say of a picture: labels (P,) int64 and offsets (P, 4) float32.
+class Targets(NamedTuple):
+    """What the priors have to say of a picture, or of each picture of a batch.
+
+    Attributes:
+        labels: (P,) int64, `POSITIVE`, `NEGATIVE` or `IGNORED`.
+        offsets: (P, 4) float32, where positive.
+        weights: (P,) float32, where positive: 1 / sqrt(n), n being the priors that have to find the same person.
+    """
+
+    labels: np.ndarray
+    offsets: np.ndarray
+    weights: np.ndarray
+
+
+def match(boxes: np.ndarray, difficult: np.ndarray, priors: np.ndarray) -> Targets:
+    """Return what every prior has to say of a picture.
 
     As SSD: the best pair of a person and a prior is joined, then the best of what is left, until every person has a
     prior of its own; then each prior that overlaps a person by `MATCH_OVERLAP` takes the one it overlaps most. The
-    first step matters here: beyond 3.8 m no prior of paper A reaches that overlap with an adult.
+    first step matters here: beyond 3.8 m no prior of paper A reaches that overlap with an adult. Unlike in SSD, a prior
+    between `NEAR_OVERLAP` and that is ignored: those were nearly all of the hardest negatives, and taught little else.
 
     Args:
         boxes: (N, 4) people, corners.
@@ -128,11 +146,14 @@ def match(boxes: np.ndarray, difficult: np.ndarray, priors: np.ndarray) -> tuple
     if len(boxes) > len(priors):
         raise ValueError(f"there are {len(boxes)} people for {len(priors)} priors; expected at most one each")
     labels, offsets = np.zeros(len(priors), np.int64), np.zeros((len(priors), 4), np.float32)
+    weights = np.zeros(len(priors), np.float32)
     if len(boxes) == 0:
-        return labels, offsets
+        return Targets(labels, offsets, weights)
     overlaps = iou(boxes, to_corners(priors))
     owner = overlaps.argmax(axis=0)
-    owned = overlaps.max(axis=0) >= MATCH_OVERLAP
+    best = overlaps.max(axis=0)
+    owned = best >= MATCH_OVERLAP
+    labels[best >= NEAR_OVERLAP] = IGNORED
     overlaps = np.where(difficult[:, None], -1.0, overlaps)  # these need no prior of their own
     for _ in range(int((~difficult).sum())):
         person, prior = divmod(int(overlaps.argmax()), len(priors))
@@ -141,4 +162,5 @@ def match(boxes: np.ndarray, difficult: np.ndarray, priors: np.ndarray) -> tuple
     labels[owned] = np.where(difficult[owner[owned]], IGNORED, POSITIVE)
     found = labels == POSITIVE
     offsets[found] = encode(boxes[owner[found]], priors[found])
-    return labels, offsets
+    weights[found] = 1.0 / np.sqrt(np.bincount(owner[found])[owner[found]])
+    return Targets(labels, offsets, weights)

@@ -129,9 +129,9 @@ class _Run:
         config = self.config
         rows: list[list[float]] = []
         result: Score | None = None
-        for pictures, labels, offsets in self._batches():
+        for pictures, targets in self._batches():
             begun = time.perf_counter()
-            loss = self._learn(pictures, labels, offsets)
+            loss = self._learn(pictures, targets)
             self.step += 1
             self.seconds += time.perf_counter() - begun
             rows.append([self.step, *(round(float(part), 5) for part in loss), self._rate(self.step - 1)])
@@ -140,7 +140,7 @@ class _Run:
                 rows = []
         return result or evaluate(self.averaged, self.test, config.test_pictures)
 
-    def _batches(self) -> Iterator[tuple[torch.Tensor, torch.Tensor, torch.Tensor]]:
+    def _batches(self) -> Iterator[tuple[torch.Tensor, list[torch.Tensor]]]:
         loader = DataLoader(
             _Batches(self.config),
             batch_size=None,
@@ -151,13 +151,13 @@ class _Run:
         )
         yield from loader
 
-    def _learn(self, pictures: torch.Tensor, labels: torch.Tensor, offsets: torch.Tensor) -> Loss:
+    def _learn(self, pictures: torch.Tensor, targets: list[torch.Tensor]) -> Loss:
         for group in self.optimiser.param_groups:
             group["lr"] = self._rate(self.step)
         inputs = to_tensor(pictures.to(self.device, non_blocking=True))
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.device.type == "cuda"):
             logits, coded = self.network(inputs)
-        loss = multibox_loss(logits.float(), coded.float(), labels.to(self.device), offsets.to(self.device))
+        loss = multibox_loss(logits.float(), coded.float(), *(part.to(self.device) for part in targets))
         if not torch.isfinite(loss.total):
             raise FloatingPointError(f"the loss is {float(loss.total)} at step {self.step}; lower the rate")
         self.optimiser.zero_grad(set_to_none=True)
@@ -209,24 +209,22 @@ class _Run:
 
 
 class _Batches(Dataset):
-    """Batch number -> pictures (B, 300, 300, C) uint8, labels (B, P) int64, offsets (B, P, 4)."""
+    """Batch number -> pictures (B, 300, 300, C) uint8, and the `Targets` of their priors with a leading axis."""
 
     def __init__(self, config: TrainConfig) -> None:
         self._config = config
         self._priors = prior_boxes(NETS[config.net].layers)
         self._source: SampleSource | None = None
 
-    def __getitem__(self, number: int) -> tuple[np.ndarray, ...]:
+    def __getitem__(self, number: int) -> tuple[np.ndarray, list[np.ndarray]]:
         if self._source is None:
             self._source = SampleSource(self._config.seed, self._config.data)
-        pictures, labels, offsets = [], [], []
+        pictures, targets = [], []
         for k in range(number * self._config.batch, (number + 1) * self._config.batch):
             sample = self._source.sample(k)
             pictures.append(network_input(sample.rgb, sample.depth))
-            label, offset = match(sample.boxes, sample.difficult, self._priors)
-            labels.append(label)
-            offsets.append(offset)
-        return np.stack(pictures), np.stack(labels), np.stack(offsets)
+            targets.append(match(sample.boxes, sample.difficult, self._priors))
+        return np.stack(pictures), [np.stack(part) for part in zip(*targets, strict=True)]
 
 
 def _use_one_thread(_: int) -> None:

@@ -44,7 +44,7 @@ def test_what_is_reported_lies_in_the_picture_and_repeats(weights: Path) -> None
 
 def test_outputs_that_say_the_truth_are_read_as_the_truth() -> None:
     people = np.array([[0.1, 0.2, 0.35, 0.9], [0.6, 0.1, 0.8, 1.0]])
-    labels, offsets = match(people, np.array([False, False]), PRIORS)
+    labels, offsets, _ = match(people, np.array([False, False]), PRIORS)
     logits = np.stack([np.zeros(len(PRIORS)), np.where(labels == 1, 4.0, -4.0)], axis=1)
     found = read(logits, offsets, PRIORS, (640, 480), 0.5)
     boxes = np.array(sorted(d.box for d in found))

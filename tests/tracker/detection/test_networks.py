@@ -1,5 +1,6 @@
 """The networks: what comes out, what they cost, and that the light one learns."""
 
+import numpy as np
 import pytest
 import torch
 
@@ -48,7 +49,7 @@ def test_every_weight_gets_a_gradient(name: str) -> None:
     network = make_network(name).train()
     logits, offsets = network(torch.rand(2, 3, 300, 300))
     labels = (torch.rand(logits.shape[:2]) < 0.5).long()
-    multibox_loss(logits, offsets, labels, torch.randn_like(offsets)).total.backward()
+    multibox_loss(logits, offsets, labels, torch.randn_like(offsets), labels.float()).total.backward()
     silent = [n for n, p in network.named_parameters() if p.grad is None or not p.grad.abs().sum() > 0]
     assert silent == []
 
@@ -59,14 +60,13 @@ def test_the_light_network_learns_eight_pictures_by_heart() -> None:
     source, priors = SampleSource(5), prior_boxes(NETS["light"].layers)
     samples = [source.sample(k) for k in range(8)]
     pictures = torch.stack([torch.from_numpy(network_input(s.rgb, None)) for s in samples])
-    pairs = [match(s.boxes, s.difficult, priors) for s in samples]
-    labels = torch.stack([torch.from_numpy(label) for label, _ in pairs])
-    offsets = torch.stack([torch.from_numpy(offset) for _, offset in pairs])
+    matched = [match(s.boxes, s.difficult, priors) for s in samples]
+    targets = [torch.from_numpy(np.stack(part)) for part in zip(*matched, strict=True)]
     network = make_network("light").train().to(memory_format=torch.channels_last)
     optimiser = torch.optim.AdamW(network.parameters(), lr=3e-3)
     losses = []
     for _ in range(12):
-        loss = multibox_loss(*network(to_tensor(pictures)), labels, offsets)
+        loss = multibox_loss(*network(to_tensor(pictures)), *targets)
         optimiser.zero_grad()
         loss.total.backward()
         optimiser.step()

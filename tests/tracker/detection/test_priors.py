@@ -9,6 +9,7 @@ from tracker.detection.boxes import iou
 from tracker.detection.priors import (
     IGNORED,
     MATCH_OVERLAP,
+    NEAR_OVERLAP,
     NEGATIVE,
     PAPER_LAYERS,
     POSITIVE,
@@ -73,18 +74,23 @@ def test_a_code_is_the_shift_over_the_variances() -> None:
     np.testing.assert_allclose(to_centres(to_corners(prior)), prior)
 
 
+NOBODY, NEARLY = -1, -2
+
+
 def matched_by_search(boxes: np.ndarray, difficult: np.ndarray) -> np.ndarray:
-    """The person of each prior, or -1 for none, pair by pair."""
+    """The person of each prior, pair by pair, or that it has none or nearly one."""
     overlaps = {
         (n, p): float(iou(boxes[n : n + 1], to_corners(PRIORS[p : p + 1]))[0, 0])
         for n in range(len(boxes))
         for p in range(len(PRIORS))
     }
-    owner = np.full(len(PRIORS), -1)
+    owner = np.full(len(PRIORS), NOBODY)
     for p in range(len(PRIORS)):
         best = max(range(len(boxes)), key=lambda n: (overlaps[n, p], -n))
         if overlaps[best, p] >= MATCH_OVERLAP:
             owner[p] = best
+        elif overlaps[best, p] >= NEAR_OVERLAP:
+            owner[p] = NEARLY
     left_people, left_priors = [n for n in range(len(boxes)) if not difficult[n]], set(range(len(PRIORS)))
     while left_people:
         n, p = max(((n, p) for n in left_people for p in left_priors), key=lambda pair: overlaps[pair])
@@ -97,27 +103,34 @@ def matched_by_search(boxes: np.ndarray, difficult: np.ndarray) -> np.ndarray:
 def test_matching_equals_a_search_over_all_pairs() -> None:
     boxes = np.array([[0.1, 0.1, 0.4, 0.95], [0.45, 0.3, 0.52, 0.6], [0.15, 0.1, 0.42, 0.9], [0.6, 0.2, 0.9, 1.0]])
     difficult = np.array([False, False, False, True])
-    labels, offsets = match(boxes, difficult, PRIORS)
+    labels, offsets, weights = match(boxes, difficult, PRIORS)
     owner = matched_by_search(boxes, difficult)
-    expected = np.where(owner < 0, NEGATIVE, np.where(difficult[owner], IGNORED, POSITIVE))
+    expected = np.where(difficult[owner], IGNORED, POSITIVE)
+    expected[owner == NOBODY], expected[owner == NEARLY] = NEGATIVE, IGNORED
+    assert (owner == NEARLY).any()
     np.testing.assert_array_equal(labels, expected)
     assert {IGNORED, NEGATIVE, POSITIVE} == set(labels.tolist())
     found = labels == POSITIVE
     np.testing.assert_allclose(decode(offsets[found], PRIORS[found]), boxes[owner[found]], atol=1e-5)
     assert not offsets[~found].any()
+    for person in set(owner[found].tolist()):
+        shared = weights[found & (owner == person)]
+        np.testing.assert_allclose(shared, 1.0 / math.sqrt(len(shared)), rtol=1e-6)
+    assert not weights[~found].any()
 
 
 def test_a_distant_person_has_a_prior_although_none_overlaps_enough() -> None:
     box = np.array([[0.48, 0.40, 0.52, 0.65]])  # an adult 4.5 m away
     assert iou(box, to_corners(PRIORS)).max() < MATCH_OVERLAP
-    labels, _ = match(box, np.array([False]), PRIORS)
+    labels = match(box, np.array([False]), PRIORS).labels
     assert (labels == POSITIVE).sum() == 1
 
 
 def test_a_picture_without_people_is_all_background() -> None:
-    labels, offsets = match(np.zeros((0, 4)), np.zeros(0, bool), PRIORS)
+    labels, offsets, weights = match(np.zeros((0, 4)), np.zeros(0, bool), PRIORS)
     assert (labels == NEGATIVE).all()
     assert not offsets.any()
+    assert not weights.any()
 
 
 @pytest.mark.parametrize("box", [(0.5, 0.1, 0.5, 0.9), (0.6, 0.1, 0.5, 0.9), (0.1, 0.1, float("nan"), 0.9)])

@@ -59,12 +59,15 @@ class FollowVecEnv(VecEnv):
         self._returns, self._lengths = np.zeros(self.num_envs), np.zeros(self.num_envs, np.int64)
         self._actions: np.ndarray = np.zeros((self.num_envs, 2), np.float32)
         self._going_on: dict[str, Any] = {}
+        self._infos: list[dict[str, Any]] = []
 
     def reset(self) -> np.ndarray:
         """Return the first observations (n, ...) of new episodes in all worlds."""
+        self._infos = []
         for k, (batch, part) in enumerate(zip(self._batches, self._parts, strict=True)):
             seed = None if self._seeds[0] is None else self._seeds[0] + 1_000_003 * k
-            observations, _ = batch.reset(seed=seed)
+            observations, info = batch.reset(seed=seed)
+            self._infos.append(info)
             estimates = self._filters[k]
             if estimates is not None:
                 estimates.forget()
@@ -82,8 +85,10 @@ class FollowVecEnv(VecEnv):
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Return (observations, rewards, dones, infos); a world that is done has begun its next episode."""
         infos = [self._going_on] * self.num_envs
+        self._infos = []
         for batch, part, estimates in zip(self._batches, self._parts, self._filters, strict=True):
             observations, rewards, terminated, truncated, info = batch.step(self._actions[part])
+            self._infos.append(info)
             done = terminated | truncated
             self._rewards[part], self._dones[part] = rewards, done
             self._returns[part] += rewards
@@ -99,6 +104,20 @@ class FollowVecEnv(VecEnv):
                 assert last is not None
                 infos[part.start + int(i)] = self._last_info(part.start + int(i), last[k], truncated[i], info, i)
         return self._observations.copy(), self._rewards.copy(), self._dones.copy(), infos
+
+    def states(self) -> np.ndarray:
+        """Return the truth of all worlds as `state` observations (n, 8) with a zero last action: what teachers see."""
+        parts = []
+        for info in self._infos:
+            yaw, velocity = info["robot_pose"][:, 2], info["person_velocity"]
+            cosine, sine = np.cos(yaw), np.sin(yaw)
+            ahead = cosine * velocity[:, 0] + sine * velocity[:, 1]
+            left = cosine * velocity[:, 1] - sine * velocity[:, 0]
+            none = np.zeros(len(yaw))
+            parts.append(
+                np.column_stack((info["bearing"], info["distance"], ahead, left, *info["twist"].T, none, none))
+            )
+        return np.concatenate(parts)
 
     def close(self) -> None:
         """Close the batches."""

@@ -103,6 +103,7 @@ class PPORecipe(Recipe):
         gae_lambda: of the generalised advantage estimate.
         clip_range: of the probability ratio.
         initial_log_std: logarithm of the action's standard deviation at the start.
+        cloned_pictures: pictures from which the policy learns the oracle's actions before; 0 = none.
     """
 
     rollout: int = 128
@@ -111,6 +112,7 @@ class PPORecipe(Recipe):
     gae_lambda: float = 0.95
     clip_range: float = 0.2
     initial_log_std: float = -0.7
+    cloned_pictures: int = 0
 
 
 @dataclass(frozen=True)
@@ -149,7 +151,19 @@ class SACRecipe(Recipe):
 RECIPES: dict[str, Recipe] = {
     "ppo": PPORecipe(),
     "ppo_estimate": PPORecipe(observation="estimate"),
-    "ppo_pixels": PPORecipe(observation="rgbd_uint8", steps=600_000, worlds=32, rollout=64, minibatch=512, epochs=4),
+    "ppo_pixels": PPORecipe(
+        observation="rgbd_uint8",
+        steps=240_000,
+        worlds=32,
+        legs=4,
+        learning_rate=2e-4,
+        rollout=128,
+        minibatch=512,
+        epochs=4,
+        clip_range=0.1,
+        initial_log_std=-1.6,
+        cloned_pictures=40_000,
+    ),
     "recurrent_ppo": RecurrentPPORecipe(steps=2_000_000),
     "sac": SACRecipe(),
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import time
 from collections.abc import Callable
@@ -13,22 +14,24 @@ import gymnasium as gym
 import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
+from stable_baselines3 import PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import configure
 
 import follow_env
 from baselines.benchmark.assembly import PICTURE
-from baselines.benchmark.cells import ENVIRONMENT_IDS
+from baselines.benchmark.cells import ENVIRONMENT_IDS, SCENES
 from baselines.benchmark.configuration import machine, packages
 from baselines.benchmark.files import write_csv, write_text
 from baselines.benchmark.store import InputError
 from baselines.calibration import noise_model
 from baselines.learned.adapter import FollowVecEnv
 from baselines.learned.agents import SUFFIX, Agent, Card, save_agent
+from baselines.learned.cloning import clone_oracle
 from baselines.learned.estimates import BatchFilter
-from baselines.learned.evaluation import CURVE_COLUMNS, HELD_SEEDS, evaluate
+from baselines.learned.evaluation import CURVE_COLUMNS, HELD_SEEDS, SCORES, evaluate
 from baselines.learned.models import load_model, make_model, policy_arrays
-from baselines.learned.recipes import Domain, Recipe, SACRecipe
+from baselines.learned.recipes import Domain, PPORecipe, Recipe, SACRecipe
 
 CONTROL_HZ = 30
 _CHECKPOINT, _BUFFER, _CURVE, _CONFIG = "checkpoint.zip", "buffer.pkl", "curve.csv", "config.json"
@@ -106,8 +109,18 @@ def train(
     finally:
         worlds.close()
         torch.set_num_threads(threads)
-    write_text(out / "machine.json", json.dumps({"machine": machine(), "wall_s": curve[-1]["wall_s"]}, indent=1) + "\n")
-    return out / f"{name}-{seed}{SUFFIX}"
+    weights = out / f"{name}-{seed}{SUFFIX}"
+    card = {
+        **dataclasses.asdict(_agent(model, name, recipe, seed).card),
+        "weights_sha256": hashlib.sha256(weights.read_bytes()).hexdigest(),
+        "recipe_settings": config["recipe"],
+        "held_out": {"seeds": list(HELD_SEEDS), "scenes": list(SCENES), **{key: curve[-1][key] for key in SCORES}},
+        "wall_s": curve[-1]["wall_s"],
+        "machine": machine(),
+        "packages": config["packages"],
+    }
+    write_text(weights.with_suffix(".json"), json.dumps(card, indent=1) + "\n")
+    return weights
 
 
 def _learn(model: BaseAlgorithm, recipe: Recipe, worlds: FollowVecEnv, seed: int, leg: int) -> None:
@@ -115,6 +128,10 @@ def _learn(model: BaseAlgorithm, recipe: Recipe, worlds: FollowVecEnv, seed: int
     fresh = int(np.random.SeedSequence((seed, leg)).generate_state(1)[0] >> 1)
     model.set_random_seed(fresh)
     worlds.seed(fresh)
+    if leg == 0 and isinstance(recipe, PPORecipe) and recipe.cloned_pictures:
+        assert isinstance(model, PPO)
+        clone_oracle(model, worlds, recipe.cloned_pictures, fresh)
+        worlds.seed(fresh)
     model._last_obs = None  # start the leg with new episodes
     model.learning_rate = recipe.learning_rate * (1.0 - 0.9 * leg / max(recipe.legs - 1, 1))
     model._setup_lr_schedule()

@@ -103,6 +103,20 @@ def _train(parsed: argparse.Namespace) -> int:
     return 0
 
 
+def _export(parsed: argparse.Namespace) -> int:
+    from baselines.benchmark.assembly import cell_of
+    from baselines.learned.offline import export
+
+    dataset_id = parsed.id or f"follow_env/{parsed.scene}/{parsed.policy}-v0"
+    try:
+        dataset = export(cell_of(parsed.policy, parsed.scene), range(parsed.episodes), dataset_id)
+    except ValueError as error:
+        print(f"follow: {error}", file=sys.stderr)
+        return BAD_INPUT
+    print(f"{dataset_id}: {dataset.total_episodes} episodes, {dataset.total_steps} steps in {dataset.spec.data_path}")
+    return 0
+
+
 def _watch(parsed: argparse.Namespace) -> int:
     from baselines.watch import watch
 
@@ -204,6 +218,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_reproduce(commands)
     _add_bench(commands)
     _add_train(commands)
+    _add_export(commands)
     _add_watch(commands)
     _add_track(commands)
     _add_calibrate(commands)
@@ -263,6 +278,15 @@ def _add_train(commands: _Commands) -> None:
     train.add_argument("--out", type=Path, metavar="DIR", help="default: results/learned/ALGO-S")
     train.add_argument("--resume", action="store_true", help="go on after the last finished leg")
     train.set_defaults(run=_train)
+
+
+def _add_export(commands: _Commands) -> None:
+    export = commands.add_parser("export", help="store episodes as a Minari dataset, for offline learning")
+    export.add_argument("--policy", default="akf", metavar="NAME", help="estimator, floor or agent (default: akf)")
+    export.add_argument("--scene", choices=SCENES, default="corridor", help="default: %(default)s")
+    export.add_argument("--episodes", type=_positive, default=100, metavar="N", help="seeds 0 to N-1; default: 100")
+    export.add_argument("--id", metavar="ID", help="default: follow_env/SCENE/NAME-v0")
+    export.set_defaults(run=_export)
 
 
 def _add_watch(commands: _Commands) -> None:

@@ -6,11 +6,11 @@ import json
 from collections.abc import Hashable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from baselines.benchmark.cells import PIXELS, Cell
+from baselines.benchmark.cells import ESTIMATORS, PIXELS, Cell
 from baselines.calibration import NoiseModel, noise_model, sensor
 from baselines.floors import FLOORS
 from baselines.policy import OBSERVATION_OF, Policy, make_follower
-from follow_env.config import CameraConfig
+from follow_env.config import CameraConfig, choose
 
 if TYPE_CHECKING:
     import gymnasium
@@ -19,6 +19,30 @@ CAMERA = {"width": 320, "height": 240}
 """Picture of the `mask` rung, px."""
 PICTURE = {"width": 84, "height": 84}
 """Picture of the agents that drive from pixels, px."""
+
+
+def cell_of(policy: str, scene: str) -> Cell:
+    """Return the cell in which a policy drives with the environments' own sensor.
+
+    Args:
+        policy: an estimator (with the paper's PI), a floor or ceiling, or an agent.
+        scene: scene name.
+
+    Raises:
+        ValueError: for an unknown policy; names the nearest.
+    """
+    if policy in ESTIMATORS:
+        return Cell("emulated", scene, policy, sensor="default")
+    if policy == "oracle":
+        return Cell("truth", scene, "none", policy)
+    if policy in FLOORS:
+        return Cell("emulated", scene, "none", policy, sensor="default")
+    from baselines.learned.agents import load_agent, shipped
+
+    name = choose("policy", policy, (*ESTIMATORS, *FLOORS, *shipped()))
+    if load_agent(name).observation == "rgbd_uint8":
+        return Cell(PIXELS, scene, "none", name)
+    return Cell("emulated", scene, "none", name, sensor="default")
 
 
 def environment_kwargs(cell: Cell, camera: Mapping[str, int] = CAMERA) -> dict[str, Any]:

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from baselines.benchmark import configuration, metrics
-from baselines.benchmark.cells import PIXELS, SCENES, Cell
+from baselines.benchmark.assembly import cell_of
+from baselines.benchmark.cells import SCENES, Cell
 from baselines.benchmark.episodes import EpisodeFunction
 from baselines.benchmark.files import Value, write_csv, write_text
 from baselines.benchmark.metrics import Row
@@ -16,7 +17,7 @@ from baselines.benchmark.report import markdown_table
 from baselines.benchmark.running import Played, rows, run
 from baselines.benchmark.statistics import Score
 from baselines.benchmark.store import Store
-from baselines.learned.agents import load_agent, shipped, weights_file
+from baselines.learned.agents import shipped, weights_file
 
 EPISODES = 100
 RANKED_TRAININGS = 5
@@ -44,17 +45,8 @@ _DIGITS = 6
 
 def cells(agents: Sequence[str]) -> list[Cell]:
     """Cells of the suite: followers with PI, floors, ceiling and the agents, in both scenes."""
-    found = []
-    for scene in SCENES:
-        found += [Cell("emulated", scene, estimator, sensor="default") for estimator in ("akf", "kf", "none")]
-        found += [Cell("emulated", scene, "none", name, sensor="default") for name in ("parked", "random")]
-        found.append(Cell("truth", scene, "none", "oracle"))
-        for name in agents:
-            pixels = load_agent(name).observation == "rgbd_uint8"
-            found.append(
-                Cell(PIXELS, scene, "none", name) if pixels else Cell("emulated", scene, "none", name, sensor="default")
-            )
-    return found
+    policies = ("akf", "kf", "none", "parked", "random", "oracle", *agents)
+    return [cell_of(policy, scene) for scene in SCENES for policy in policies]
 
 
 def bench(

@@ -1,0 +1,51 @@
+"""How a command ends before its time: the exit codes, and the error that carries one of them to `main`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from baselines.benchmark.episodes import Player
+
+FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
+"""Exit codes: something broke, the input was bad, Ctrl-C."""
+
+
+class CommandError(Exception):
+    """Ends a command with a sentence for its user.
+
+    Attributes:
+        code: The exit code.
+    """
+
+    def __init__(self, sentence: str, code: int = BAD_INPUT) -> None:
+        super().__init__(sentence)
+        self.code = code
+
+
+@contextmanager
+def bad_input(*kinds: type[Exception]) -> Iterator[None]:
+    """Let errors of these kinds end the command: their sentence tells what was wrong with the input."""
+    try:
+        yield
+    except kinds as error:
+        raise CommandError(str(error)) from error
+
+
+@contextmanager
+def playing(out: Path) -> Iterator[Player]:
+    """Lend a player for a run that keeps its episodes in ``out``; an episode that breaks ends the command."""
+    from baselines.benchmark.episodes import Player
+    from baselines.benchmark.pool import EpisodeError
+
+    player = Player()
+    try:
+        yield player
+    except EpisodeError as error:
+        sentence = f"{error}\nWhat was finished is kept in {out}: --resume goes on with it."
+        raise CommandError(sentence, FAILED) from error
+    finally:
+        player.close()

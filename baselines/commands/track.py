@@ -1,0 +1,60 @@
+"""`follow track`: track a person in recorded colour and depth pictures."""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import sys
+from pathlib import Path
+
+from baselines.commands.arguments import Commands
+from baselines.commands.exits import CommandError, bad_input
+
+
+def add(commands: Commands) -> None:
+    """Add the command to ``follow``."""
+    track = commands.add_parser(
+        "track",
+        help="track a person in recorded colour and depth pictures",
+        description="Track a person through a recording: a folder with camera.json, color/ (or rgb/) and depth/; "
+        "`tracker/recording.py` describes it.",
+    )
+    track.add_argument("source", type=Path, metavar="SOURCE", help="folder of the recording")
+    track.add_argument("--out", type=Path, metavar="DIR", help="results folder (default: results/track-SOURCE)")
+    track.add_argument("--net", default="light", help="the detector's network (default: %(default)s)")
+    track.add_argument("--weights", type=Path, metavar="FILE", help="its weights (default: the shipped ones)")
+    track.add_argument(
+        "--target",
+        type=_pixel,
+        metavar="U,V",
+        help="a picture point on the person (default: the largest, most central)",
+    )
+    track.set_defaults(run=_run)
+
+
+def _run(parsed: argparse.Namespace) -> None:
+    from baselines.track import track
+    from tracker.recording import Recording
+
+    try:
+        with bad_input(ValueError, OSError):
+            recording = Recording.open(parsed.source)
+            from tracker.detection.detector import PersonDetector
+
+            detector = PersonDetector(parsed.net, parsed.weights)
+            out = parsed.out or Path("results", f"track-{parsed.source.resolve().name}")
+            print(track(recording, out, detector, parsed.target, functools.partial(print, file=sys.stderr)))
+    except ModuleNotFoundError as error:
+        raise CommandError(
+            f"the detector needs {error.name}; install it with pip install 'follow-env[learn]'"
+        ) from error
+
+
+def _pixel(text: str) -> tuple[float, float]:
+    try:
+        u, v = map(float, text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no picture point; expected two numbers such as 160,120"
+        ) from None
+    return u, v

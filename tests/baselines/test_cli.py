@@ -28,7 +28,9 @@ def follow(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*FOLLOW, *arguments], cwd=cwd, env=environment, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["reproduce", "table1", "--help"], ["watch", "--help"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["reproduce", "table1", "--help"], ["watch", "--help"], ["track", "--help"]]
+)
 def test_help_imports_nothing_heavy(arguments: list[str], tmp_path: Path) -> None:
     script = (
         "import sys\nfrom baselines import cli\n"

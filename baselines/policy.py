@@ -287,7 +287,8 @@ def make_follower(
         scene: whose calibrated noise is taken when `noise` is None.
         controller: `pi`, the paper's gains.
         noise: R and Q; by default those of the calibration for this perception and scene (`detector` takes those of
-            `mask`, whose depths are read by the same rule).
+            `mask`, whose depths are read by the same rule; as its Q covers (rate * time between measurements)^2 and
+            only every n-th frame is measured, n steps share n^2 Q, and each takes n Q).
         alpha: significance of the adaptive test.
         sensor: whose calibrated noise is taken; for `mask` also the rule by which depth is read from the box.
         camera: of the pictures that `mask` and `detector` read; by default the environment's default camera.
@@ -300,8 +301,9 @@ def make_follower(
     choose("perception", perception, OBSERVATION_OF)
     sensor = sensor or DEFAULT_SENSOR[perception]
     if noise is None:
-        noise = noise_model("mask" if perception == "detector" else perception, scene, sensor)
-        slower = (30.0 / control_hz) ** 2
+        tracked = perception == "detector"
+        noise = noise_model("mask" if tracked else perception, scene, sensor)
+        slower = (30.0 / control_hz) ** 2 * (TrackerSettings.for_rate(control_hz).every if tracked else 1)
         noise = replace(noise, process=(slower * noise.process[0], slower * noise.process[1]))
     make_estimator(estimator, noise, alpha)
     if perception == "detector":

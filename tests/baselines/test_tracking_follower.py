@@ -35,7 +35,7 @@ def follower_in(env, estimator="akf"):
     return make_follower(estimator, "detector", camera=CameraConfig(**CAMERA), detector=detector), detector
 
 
-@pytest.mark.parametrize("estimator", ["none", "akf_cv"])
+@pytest.mark.parametrize("estimator", ["akf", "akf_cv"])
 def test_it_follows_the_person_to_the_end_of_the_route(env, estimator):
     follower, _ = follower_in(env, estimator)
     observation, info = env.reset(seed=2)

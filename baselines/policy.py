@@ -278,6 +278,7 @@ def make_follower(
     robot: RobotConfig | None = None,
     control_hz: int = 30,
     detector: Detector | None = None,
+    bias: Pair = (0.0, 0.0),
 ) -> Follower:
     """Return paper B's follower, or a variant of it.
 
@@ -296,6 +297,7 @@ def make_follower(
         control_hz: of the environment. Q per step is calibrated at 30 Hz and scales with the square of the period.
         detector: finds people for `detector`; by default the shipped one, which needs PyTorch. It has no memory, so
             episodes share it.
+        bias: known constant errors (rad, m) of a memoryless perception, taken off each measurement; the paper has none.
     """
     choose("controller", controller, CONTROLLERS)
     choose("perception", perception, OBSERVATION_OF)
@@ -313,7 +315,14 @@ def make_follower(
         )
     rule = cast(Rule, sensor) if perception == "mask" else "six_smallest"
     perceive = make_perception(perception, camera, robot, rule)
+    if any(bias):
+        perceive = functools.partial(_corrected, perceive, bias)
     return Follower(perceive, lambda: make_estimator(estimator, noise, alpha), robot=robot, dt=1.0 / control_hz)
+
+
+def _corrected(perceive: Callable[[Any], Percept], bias: Pair, observation: Any) -> Percept:
+    measured, twist = perceive(observation)
+    return (None if measured is None else (measured[0] - bias[0], measured[1] - bias[1])), twist
 
 
 def _tracker_factory(

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from baselines.benchmark.cells import ESTIMATORS, PIXELS, Cell
-from baselines.calibration import NoiseModel, noise_model, sensor
+from baselines.calibration import NoiseModel, Pair, noise_model, sensor
 from baselines.floors import FLOORS
 from baselines.policy import OBSERVATION_OF, Policy, make_follower
 from follow_env.config import CameraConfig, choose
@@ -19,6 +19,10 @@ CAMERA = {"width": 320, "height": 240}
 """Picture of the `mask` rung, px."""
 PICTURE = {"width": 84, "height": 84}
 """Picture of the agents that drive from pixels, px."""
+
+
+UNBIASED = "pi_unbiased"
+"""The reference when somebody has taken the sensor's constant bias off each measurement."""
 
 
 def cell_of(policy: str, scene: str) -> Cell:
@@ -33,13 +37,15 @@ def cell_of(policy: str, scene: str) -> Cell:
     """
     if policy in ESTIMATORS:
         return Cell("emulated", scene, policy, sensor="default")
+    if policy == UNBIASED:
+        return Cell("emulated", scene, "akf", policy, sensor="default")
     if policy == "oracle":
         return Cell("truth", scene, "none", policy)
     if policy in FLOORS:
         return Cell("emulated", scene, "none", policy, sensor="default")
     from baselines.learned.agents import load_agent, shipped
 
-    name = choose("policy", policy, (*ESTIMATORS, *FLOORS, *shipped()))
+    name = choose("policy", policy, (*ESTIMATORS, UNBIASED, *FLOORS, *shipped()))
     if load_agent(name).observation == "rgbd_uint8":
         return Cell(PIXELS, scene, "none", name)
     return Cell("emulated", scene, "none", name, sensor="default")
@@ -78,7 +84,7 @@ def driver(cell: Cell, camera: Mapping[str, int] = CAMERA) -> Policy:
     """
     if cell.controller in FLOORS:
         return FLOORS[cell.controller]()
-    if cell.controller != "pi":
+    if cell.controller not in ("pi", UNBIASED):
         from baselines.learned.agents import load_agent
 
         return load_agent(cell.controller, cell.scene)
@@ -89,9 +95,15 @@ def driver(cell: Cell, camera: Mapping[str, int] = CAMERA) -> Policy:
         cell.estimator,
         cell.perception,
         cell.scene,
-        cell.controller,
+        "pi",
         scaled,
         cell.alpha,
         cell.sensor,
         CameraConfig(**camera),
+        bias=_bias(cell) if cell.controller == UNBIASED else (0.0, 0.0),
     )
+
+
+def _bias(cell: Cell) -> Pair:
+    errors = sensor(cell.sensor, cell.scene)
+    return errors["bearing_bias"], errors["distance_bias"]

@@ -153,10 +153,12 @@ class Score:
     Attributes:
         value: Of one training the plain score, of several the interquartile mean over them.
         resamples: The same of each resample, shape (RESAMPLES,): episodes are resampled, and so are the trainings.
+        episodes: Number of episodes of each training.
     """
 
     value: float
     resamples: NDArray[np.float64]
+    episodes: int
 
     @classmethod
     def of(cls, trainings: Sequence[Sequence[Row]], column: str, root_mean_square: bool) -> Score:
@@ -164,9 +166,15 @@ class Score:
 
         Args:
             trainings: Rows of each training in the order of their seeds, the same seeds in each.
-            column: Of ``metrics.COLUMNS``; every episode has it.
+            column: Of ``metrics.COLUMNS``, with a number in each row.
             root_mean_square: Whether the column is an RMS over steps, pooled as one; otherwise the mean is taken.
+
+        Raises:
+            ValueError: If an episode has no such number.
         """
+        missing = [_name(row) for rows in trainings for row in rows if not isinstance(row[column], (int, float))]
+        if missing:
+            raise ValueError(f"The episode {missing[0]} has no {column}, but the table needs it of each episode.")
         values = np.array([[float(str(row[column])) for row in rows] for rows in trainings])
         weights = np.array([[float(str(row["steps"])) for row in rows] for rows in trainings])
         if not root_mean_square:
@@ -180,20 +188,26 @@ class Score:
         means, resampled = sums.sum(axis=1) / weights.sum(axis=1), totals / steps
         if root_mean_square:
             means, resampled = np.sqrt(means), np.sqrt(resampled)
-        chosen = np.random.default_rng(_GENERATOR_SEED).integers(0, count, size=(count, RESAMPLES))
+        chosen = np.random.default_rng((_GENERATOR_SEED, 1)).integers(0, count, size=(count, RESAMPLES))
         return cls(
             float(interquartile_mean(means[:, None])[0]),
             interquartile_mean(np.take_along_axis(resampled, chosen, axis=0)),
+            values.shape[1],
         )
 
     @property
-    def interval(self) -> Interval:
-        """95 % interval."""
-        return _interval(self.resamples)
+    def interval(self) -> Interval | None:
+        """95 % interval; None where one episode gives none."""
+        return _interval(self.resamples) if self.episodes >= 2 else None
 
     def minus(self, other: Score) -> Difference:
         """Paired difference over the same episodes."""
-        return Difference(self.value - other.value, _interval(self.resamples - other.resamples))
+        if self.episodes != other.episodes:
+            raise ValueError(
+                f"Scores of {self.episodes} and {other.episodes} episodes cannot be paired: compare the same seeds."
+            )
+        paired = self.interval is not None
+        return Difference(self.value - other.value, _interval(self.resamples - other.resamples) if paired else None)
 
 
 def interquartile_mean(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import functools
+import math
 import sys
 from pathlib import Path
 
@@ -54,7 +55,7 @@ def _pixel(text: str) -> tuple[float, float]:
     try:
         u, v = map(float, text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is no picture point; expected two numbers such as 160,120"
-        ) from None
+        u = v = math.nan
+    if not (math.isfinite(u) and math.isfinite(v)):
+        raise argparse.ArgumentTypeError(f"{text!r} is no picture point; expected two numbers such as 160,120")
     return u, v

@@ -13,7 +13,7 @@ import numpy as np
 
 from baselines.calibration import Pair, noise_model
 from baselines.learned.networks import ACTIVATIONS, Arrays, Memory, Network
-from baselines.learned.recipes import ENVIRONMENT, OBSERVATIONS
+from baselines.learned.recipes import CONTROL_HZ, ENVIRONMENT, OBSERVATIONS
 from follow_env.config import choose
 from tracker.filters import AdaptiveKalmanFilter, Estimate, Estimator
 
@@ -28,7 +28,7 @@ class Card:
         recipe: name of the recipe.
         recipe_sha256: digest of everything in the recipe.
         seed: of the training.
-        steps: environment steps of the training.
+        steps: environment steps of the training, with those in which a teacher was cloned.
         observation: one of `recipes.OBSERVATIONS`.
         activation: between dense layers.
         squash: whether tanh bounds the action.
@@ -62,14 +62,13 @@ class Agent:
         card: what the weights are.
         arrays: the network, see `baselines.learned.networks`.
         scene: whose calibrated noise the filter of an `estimate` agent takes.
-        control_hz: of the environment.
     """
 
-    def __init__(self, card: Card, arrays: Arrays, scene: str = "corridor", control_hz: int = 30) -> None:
+    def __init__(self, card: Card, arrays: Arrays, scene: str = "corridor") -> None:
         self.card = card
-        self._arrays, self._control_hz = arrays, control_hz
+        self._arrays = arrays
         self._network = Network(arrays, choose("activation", card.activation, ACTIVATIONS), card.squash)
-        self._noise, self._dt = noise_model("emulated", scene, "default"), 1.0 / control_hz
+        self._noise = noise_model("emulated", scene, "default")
 
     @property
     def name(self) -> str:
@@ -83,7 +82,7 @@ class Agent:
 
     def in_scene(self, scene: str) -> Agent:
         """Return the agent with the calibrated filter noise of another scene."""
-        return Agent(self.card, self._arrays, scene, self._control_hz)
+        return Agent(self.card, self._arrays, scene)
 
     def predict(
         self,
@@ -95,7 +94,7 @@ class Agent:
         """Return (action, state) for one observation, or for a batch of n with a list of n states.
 
         Raises:
-            ValueError: if the observation is not of the mode that the agent was trained on.
+            ValueError: if the observation has not the shape that the agent was trained on.
         """
         single = 3 if self.card.observation == "rgbd_uint8" else 1
         if isinstance(observation, Mapping) or np.ndim(observation) not in (single, single + 1):
@@ -128,7 +127,7 @@ class Agent:
             bearing, distance, valid, _, v, omega, _, _ = observation.tolist()
             state.measurement = (bearing, distance) if valid else None
             if state.estimator is not None:
-                state.estimator.predict((v, omega), self._dt)
+                state.estimator.predict((v, omega), 1.0 / CONTROL_HZ)
                 state.estimate = state.estimator.update(state.measurement)
                 observation = observation.copy()
                 observation[:3] = (state.estimate.bearing, state.estimate.distance, 1.0) if state.estimate else 0.0
@@ -143,7 +142,7 @@ def save_agent(path: Path, card: Card, arrays: Arrays) -> None:
     save_file({name: np.ascontiguousarray(a) for name, a in arrays.items()}, path, {"card": json.dumps(asdict(card))})
 
 
-def load_agent(name: str | Path, scene: str = "corridor", control_hz: int = 30) -> Agent:
+def load_agent(name: str | Path, scene: str = "corridor") -> Agent:
     """Return a shipped agent (`shipped()` names them) or that of a weights file.
 
     Raises:
@@ -169,7 +168,7 @@ def load_agent(name: str | Path, scene: str = "corridor", control_hz: int = 30) 
             f"`follow train {card.recipe} --seed {card.seed}`"
         )
     choose("observation", card.observation, OBSERVATIONS)
-    return Agent(card, arrays, scene, control_hz)
+    return Agent(card, arrays, scene)
 
 
 def shipped() -> list[str]:

@@ -13,12 +13,12 @@ from follow_env.env import FollowEnv
 
 HELD_SEEDS = range(20_000, 20_005)
 """Apart from the seeds of the tables and of the calibration."""
-SCORES = ("success", "angle_tracking_rmse_rad", "distance_tracking_rmse_m", "collisions", "losses")
+SCORES = ("success", "angle_tracking_rmse_rad", "distance_tracking_rmse_m", "collided", "lost")
 CURVE_COLUMNS = ("steps", *SCORES, "wall_s")
 
 
 def evaluate(agent: Agent, seeds: Iterable[int]) -> dict[str, float]:
-    """Return the means of `SCORES` over the seeds in both scenes (RMSE pooled over the episodes)."""
+    """Return the means of `SCORES` over the episodes of both scenes; of an RMSE the root of the mean square."""
     seeds, rows = list(seeds), []
     for scene in SCENES:
         camera = PICTURE if agent.observation == "rgbd_uint8" else None
@@ -36,6 +36,6 @@ def evaluate(agent: Agent, seeds: Iterable[int]) -> dict[str, float]:
     return {
         "success": mean(values("success")),
         **{key: math.sqrt(mean(value * value for value in values(key))) for key in SCORES[1:3]},
-        "collisions": mean(row["ended"] == "collision" for row in rows),
-        "losses": mean(row["ended"] == "lost" for row in rows),
+        "collided": mean(row["ended"] == "collision" for row in rows),
+        "lost": mean(row["ended"] == "lost" for row in rows),
     }

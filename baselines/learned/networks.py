@@ -33,7 +33,7 @@ class Network:
         squash: whether tanh bounds the action (SAC); otherwise it is clipped (PPO).
 
     Raises:
-        ValueError: if an array is missing, has the wrong shape or is not finite.
+        ValueError: if an array is missing, does not fit the others or is not finite.
     """
 
     def __init__(self, arrays: Arrays, activation: str, squash: bool) -> None:
@@ -49,6 +49,7 @@ class Network:
             self._lstm = (wide["lstm.weight_ih"], wide["lstm.weight_hh"], wide["lstm.bias"]) if lstm else None
         except KeyError as missing:
             raise ValueError(f"the weights lack {missing}; the file is not one of this project's agents") from None
+        self._check()
         self._activation, self._squash = ACTIVATIONS.index(activation), squash
 
     @property
@@ -56,18 +57,45 @@ class Network:
         """Length of the observation, or number of the picture's channels."""
         return self._conv[0][0].shape[1] if self._conv else len(self._input[0])  # type: ignore[index]
 
+    def _check(self) -> None:
+        """Raise a ValueError unless each array fits the one before: the kernels do not look."""
+        if not self._dense or self._dense[-1][0].shape[0] != 2:
+            raise ValueError("the weights do not end in two actions; the file is not one of this project's agents")
+        chain = [array for layer in self._dense for array in (layer[0].shape[1], layer[0].shape[0])]
+        fits = all(w.ndim == 2 and b.shape == w.shape[:1] for w, b in self._dense) and chain[1:-1:2] == chain[2::2]
+        if self._lstm is not None:
+            w_ih, w_hh, bias = self._lstm
+            units = w_hh.shape[1]
+            fits &= len(w_ih) == len(w_hh) == len(bias) == 4 * units and chain[0] == units
+        if self._input is not None:
+            size = self._lstm[0].shape[1] if self._lstm else chain[0]
+            fits &= self._input[0].shape == self._input[1].shape == (size,)
+        channels = [n for w, _, _ in self._conv for n in (w.shape[1], w.shape[0])]
+        fits &= all(w.ndim == 4 and w.shape[2] == w.shape[3] and b.shape == w.shape[:1] for w, b, _ in self._conv)
+        if not (fits and channels[1:-1:2] == channels[2::2]):
+            raise ValueError("the weights do not fit each other; the file is damaged: get it again")
+
     def start(self) -> Memory:
         """Return the memory at an episode's start."""
         size = self._lstm[1].shape[1] if self._lstm else 0
         return np.zeros(size), np.zeros(size)
 
     def act(self, observation: np.ndarray, memory: Memory) -> tuple[np.ndarray, Memory]:
-        """Return the action (2,) float32 in [-1, 1] and the new memory for one observation."""
+        """Return the action (2,) float32 in [-1, 1] and the new memory for one observation.
+
+        Raises:
+            ValueError: for a picture of another size.
+        """
         if self._conv:
             values = np.ascontiguousarray(observation.transpose(2, 0, 1), np.float64) / 255.0
             for weight, bias, stride in self._conv:
                 values = _convolve(values, weight, bias, stride)
             features: np.ndarray = values.ravel()
+            if len(features) != self._dense[0][0].shape[1]:
+                raise ValueError(
+                    f"the picture is {observation.shape[1]}x{observation.shape[0]}; the agent was trained on another "
+                    "size: make the environment with camera={'width': 84, 'height': 84}"
+                )
         else:
             offset, scale = self._input  # type: ignore[misc]
             features = np.clip((observation.astype(np.float64) - offset) * scale, -CLIP, CLIP)

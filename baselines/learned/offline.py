@@ -11,6 +11,7 @@ import minari
 import numpy as np
 from minari import MinariDataset
 from minari.data_collector import EpisodeBuffer
+from minari.dataset.minari_dataset import parse_dataset_id
 
 from baselines.benchmark.assembly import driver, environment_kwargs
 from baselines.benchmark.cells import ENVIRONMENT_IDS, Cell
@@ -35,6 +36,10 @@ def export(cell: Cell, seeds: Iterable[int], dataset_id: str) -> MinariDataset:
         raise InputError(
             f"the dataset {dataset_id} already exists; choose another with --id, or delete it with minari."
         )
+    try:
+        parse_dataset_id(dataset_id)
+    except ValueError as error:
+        raise InputError(f"{dataset_id!r} is no name of a Minari dataset: {error}") from error
     env = gym.make(ENVIRONMENT_IDS[cell.scene], **environment_kwargs(cell))
     try:
         buffers = [_play(env, driver(cell), seed) for seed in seeds]
@@ -49,8 +54,6 @@ def export(cell: Cell, seeds: Iterable[int], dataset_id: str) -> MinariDataset:
                 requirements=["follow-env"],
                 description=f"{cell.key}, {len(buffers)} episodes of follow-env's PyBullet environment",
             )
-    except (ValueError, AssertionError) as error:
-        raise InputError(f"{dataset_id!r} cannot be stored as a Minari dataset: {error}") from error
     finally:
         env.close()
 

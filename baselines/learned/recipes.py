@@ -12,6 +12,8 @@ from follow_env.config import choose
 
 ENVIRONMENT = "follow_env/*-v0"
 """The environments' version that agents are trained for."""
+CONTROL_HZ = 30
+"""Rate at which agents learn and drive."""
 OBSERVATIONS = ("measurement", "estimate", "rgbd_uint8")
 """What an agent sees: the tracker's report, the adaptive Kalman filter's estimate of it, or the picture."""
 
@@ -57,7 +59,7 @@ class Recipe:
     Attributes:
         observation: one of `OBSERVATIONS`.
         steps: environment steps in all.
-        worlds: worlds that run at once.
+        worlds: worlds that run at once; at least one for each domain.
         legs: the training is cut into this many parts of equal length; each ends with a checkpoint and an evaluation,
             and begins with new episodes and generators seeded from (seed, leg), so that a resumed training has the
             bits of one that was never interrupted.
@@ -86,7 +88,7 @@ class Recipe:
         return PLAIN_DOMAINS if self.observation == "rgbd_uint8" else DOMAINS
 
     def digest(self) -> str:
-        """Return a hash of everything in the recipe."""
+        """Return a hash of the recipe's and the domains' numbers; the code of the training is not in it."""
         content = {"recipe": type(self).__name__, **dataclasses.asdict(self), "environment": ENVIRONMENT}
         content["domains"] = [dataclasses.asdict(domain) for domain in self.domains]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -31,10 +31,9 @@ from baselines.learned.cloning import clone_oracle
 from baselines.learned.estimates import BatchFilter
 from baselines.learned.evaluation import CURVE_COLUMNS, HELD_SEEDS, SCORES, evaluate
 from baselines.learned.models import load_model, make_model, policy_arrays
-from baselines.learned.recipes import Domain, PPORecipe, Recipe, SACRecipe
+from baselines.learned.recipes import CONTROL_HZ, Domain, PPORecipe, Recipe, SACRecipe
 
-CONTROL_HZ = 30
-_CHECKPOINT, _BUFFER, _CURVE, _CONFIG = "checkpoint.zip", "buffer.pkl", "curve.csv", "config.json"
+_CURVE, _CONFIG = "curve.csv", "config.json"
 
 assert follow_env.IDS  # importing the package registers the environments
 
@@ -82,14 +81,13 @@ def train(
         "packages": packages(),
     }
     curve = _claim(out, config, resume)
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    worlds = make_worlds(recipe, seed)
+    worlds, threads = make_worlds(recipe, seed), torch.get_num_threads()
     try:
+        torch.set_num_threads(1)
         if curve:
-            model = load_model(recipe, str(out / _CHECKPOINT), worlds)
+            model = load_model(recipe, str(_checkpoint(out, len(curve))), worlds)
             if isinstance(recipe, SACRecipe):
-                model.load_replay_buffer(out / _BUFFER)  # type: ignore[attr-defined]
+                model.load_replay_buffer(_checkpoint(out, len(curve)).with_suffix(".pkl"))  # type: ignore[attr-defined]
         else:
             model = make_model(recipe, worlds, seed)
         model.set_logger(configure(str(out / "tensorboard"), ["tensorboard"]))
@@ -99,10 +97,10 @@ def train(
             agent = _agent(model, name, recipe, seed)
             scores = evaluate(agent, HELD_SEEDS)
             spent = (curve[-1]["wall_s"] if curve else 0.0) + time.perf_counter() - began
-            curve.append({"steps": model.num_timesteps, **scores, "wall_s": round(spent, 1)})
+            curve.append({"steps": agent.card.steps, **scores, "wall_s": round(spent, 1)})
             _save(out, model, recipe, curve, agent)
             say(
-                f"{name}-{seed}: {model.num_timesteps:,} steps in {spent:.0f} s, held-out success "
+                f"{name}-{seed}: {agent.card.steps:,} steps in {spent:.0f} s, held-out success "
                 f"{scores['success']:.2f}, distance {100.0 * scores['distance_tracking_rmse_m']:.1f} cm, "
                 f"bearing {scores['angle_tracking_rmse_rad']:.3f} rad"
             )
@@ -141,17 +139,31 @@ def _learn(model: BaseAlgorithm, recipe: Recipe, worlds: FollowVecEnv, seed: int
 
 def _agent(model: BaseAlgorithm, name: str, recipe: Recipe, seed: int) -> Agent:
     arrays, activation, squash = policy_arrays(model)
-    card = Card(name, recipe.digest(), seed, model.num_timesteps, recipe.observation, activation, squash)
+    steps = model.num_timesteps + _cloned(recipe)
+    card = Card(name, recipe.digest(), seed, steps, recipe.observation, activation, squash)
     return Agent(card, arrays)
 
 
+def _cloned(recipe: Recipe) -> int:
+    """Return the environment steps in which the teacher was cloned."""
+    pictures = recipe.cloned_pictures if isinstance(recipe, PPORecipe) else 0
+    return pictures // recipe.worlds * recipe.worlds
+
+
 def _save(out: Path, model: BaseAlgorithm, recipe: Recipe, curve: list[dict[str, Any]], agent: Agent) -> None:
-    """Write checkpoint and weights first, the curve last: it says how many legs are done."""
-    model.save(out / _CHECKPOINT)
+    """Write checkpoint and weights, then the curve: it says how many legs are done; then drop the last checkpoint."""
+    leg = len(curve)
+    model.save(_checkpoint(out, leg))
     if isinstance(recipe, SACRecipe):
-        model.save_replay_buffer(out / _BUFFER)  # type: ignore[attr-defined]
-    save_agent(out / f"{agent.card.recipe}-{agent.card.seed}{SUFFIX}", agent.card, policy_arrays(model)[0])
+        model.save_replay_buffer(_checkpoint(out, leg).with_suffix(".pkl"))  # type: ignore[attr-defined]
+    save_agent(out / f"{agent.name}{SUFFIX}", agent.card, policy_arrays(model)[0])
     write_csv(out / _CURVE, CURVE_COLUMNS, curve)
+    for suffix in (".zip", ".pkl"):
+        _checkpoint(out, leg - 1).with_suffix(suffix).unlink(missing_ok=True)
+
+
+def _checkpoint(out: Path, leg: int) -> Path:
+    return out / f"checkpoint-{leg}.zip"
 
 
 def _claim(out: Path, config: dict[str, Any], resume: bool) -> list[dict[str, Any]]:

@@ -29,11 +29,15 @@ def follow(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize(
-<<<<<<< HEAD
-    "arguments", [["--help"], ["reproduce", "table1", "--help"], ["watch", "--help"], ["speed", "--help"]]
-=======
-    "arguments", [["--help"], ["reproduce", "table1", "--help"], ["watch", "--help"], ["track", "--help"]]
->>>>>>> refs/heads/tracker
+    "arguments",
+    [
+        ["--help"],
+        ["reproduce", "table1", "--help"],
+        ["watch", "--help"],
+        ["speed", "--help"],
+        ["track", "--help"],
+        ["train", "--help"],
+    ],
 )
 def test_help_imports_nothing_heavy(arguments: list[str], tmp_path: Path) -> None:
     script = (

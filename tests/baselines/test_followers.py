@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import trim_mean
 
+from baselines.benchmark.assembly import cell_of
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.episodes import Player
 from baselines.benchmark.followers import COLUMNS, REFERENCE, policy_name, records, report
@@ -50,18 +51,51 @@ def test_floors_fail_and_the_ceiling_does_not() -> None:
     player.close()
 
 
+def test_taking_the_bias_off_makes_the_reference_follow_closer() -> None:
+    player = Player()
+    plain, unbiased = (player(cell_of(name, "corridor"), 1).row for name in ("akf", "pi_unbiased"))
+    player.close()
+    assert float(str(plain["distance_bias_m"])) < -0.07
+    assert abs(float(str(unbiased["distance_bias_m"]))) < 0.03
+    assert float(str(unbiased["distance_tracking_rmse_m"])) < float(str(plain["distance_tracking_rmse_m"]))
+
+
 def test_one_training_is_pooled_over_its_steps() -> None:
     rows = drawn(12, 0.2)
     score = Score.of([rows], "distance_tracking_rmse_m", True)
     assert score.value == pytest.approx(pooled(rows))
+    assert score.interval is not None
     low, high = score.interval
     assert low < score.value < high
+
+
+def test_one_episode_has_no_interval_and_unequal_counts_no_difference() -> None:
+    one, three = (Score.of([drawn(count, 0.2)], "distance_tracking_rmse_m", True) for count in (1, 3))
+    assert one.interval is None
+    assert one.minus(one).interval is None
+    with pytest.raises(ValueError, match="Scores of 1 and 3 episodes cannot be paired"):
+        one.minus(three)
+    with pytest.raises(ValueError, match="has no rms_jerk_m_s3"):
+        Score.of(
+            [[row(rms_jerk_m_s3=None, perception="emulated", scene="indoor", estimator="kf", seed=1)]],
+            "rms_jerk_m_s3",
+            True,
+        )
+
+
+def test_episodes_and_trainings_are_resampled_independently() -> None:
+    """With trainings that each are constant, the score of a resample names its training; pairs of them must differ."""
+    by_training = [[row(success=float(k)) for _ in range(5)] for k in range(3)]
+    by_episode = [[row(success=float(k)) for k in range(5)] for _ in range(3)]
+    trainings, episodes = (Score.of(rows, "success", False).resamples for rows in (by_training, by_episode))
+    assert abs(np.corrcoef(trainings, episodes)[0, 1]) < 0.05
 
 
 def test_several_trainings_give_their_interquartile_mean() -> None:
     trainings = [drawn(10, scale) for scale in (0.1, 0.11, 0.12, 0.13, 0.9)]
     score = Score.of(trainings, "distance_tracking_rmse_m", True)
     assert score.value == pytest.approx(float(np.mean(sorted(map(pooled, trainings))[1:4])))
+    assert score.interval is not None
     low, high = score.interval
     assert low < score.value < high
     values = RNG.normal(size=(9, 4))
@@ -95,6 +129,7 @@ def test_policies_are_named_as_people_say() -> None:
         ("akf", "pi"): "AKF + PI",
         ("none", "pi"): "no filter + PI",
         ("none", "parked"): "parked",
+        ("akf", "pi_unbiased"): "AKF + PI, bias removed",
         ("none", "recurrent_ppo-1"): "recurrent_ppo",
     }
     for (estimator, controller), name in names.items():

@@ -85,3 +85,22 @@ def test_batches_of_other_observations_are_refused() -> None:
 def test_no_batch_is_refused() -> None:
     with pytest.raises(ValueError, match="no batch of worlds"):
         FollowVecEnv([])
+
+
+def test_teachers_see_the_truth_of_each_world() -> None:
+    worlds = FollowVecEnv([batch(CORRIDOR, 3), batch(INDOOR, 2)])
+    truth = [batch(CORRIDOR, 3, obs="state"), batch(INDOOR, 2, obs="state")]
+    worlds.seed(2)
+    worlds.reset()
+    states = np.concatenate([one.reset(seed=2 + 1_000_003 * k)[0] for k, one in enumerate(truth)])
+    rng, ended = np.random.default_rng(3), 0
+    for _ in range(430):
+        np.testing.assert_allclose(worlds.states()[:, :6], states[:, :6], atol=1e-5)
+        actions = rng.uniform(-1.0, 1.0, (5, 2)).astype(np.float32)
+        _, _, dones, _ = worlds.step(actions)
+        ended += int(dones.sum())
+        states = np.concatenate(
+            [one.step(part)[0] for one, part in zip(truth, (actions[:3], actions[3:]), strict=True)]
+        )
+    assert ended > 0
+    worlds.close()

@@ -80,3 +80,20 @@ def test_missing_weights_are_named() -> None:
     del arrays["input.scale"]
     with pytest.raises(ValueError, match=r"lack 'input\.scale'"):
         Network(arrays, activation, squash)
+
+
+@pytest.mark.parametrize("name", RECIPES)
+def test_weights_that_do_not_fit_each_other_are_refused(name: str) -> None:
+    arrays, activation, squash = policy_arrays(stirred(RECIPES[name]))
+    arrays["dense.0.weight"] = np.zeros((arrays["dense.0.weight"].shape[0] + 1, 9), np.float32)
+    with pytest.raises(ValueError, match="do not fit each other"):
+        Network(arrays, activation, squash)
+
+
+@pytest.mark.parametrize("shape", [(64, 64, 4), (120, 160, 4)])
+def test_a_picture_of_another_size_is_refused(shape: tuple[int, int, int]) -> None:
+    network = Network(*policy_arrays(stirred(RECIPES["ppo_pixels"])))
+    with pytest.raises(
+        ValueError, match=f"the picture is {shape[1]}x{shape[0]}; the agent was trained on another size"
+    ):
+        network.act(np.zeros(shape, np.uint8), network.start())

@@ -39,7 +39,7 @@ def test_the_dataset_gives_back_environment_and_episodes(capsys: pytest.CaptureF
     ("words", "sentence"),
     [
         (["--policy", "akv"], "policy 'akv' is not known"),
-        (["--policy", "parked", "--episodes", "1", "--id", "no good"], "cannot be stored as a Minari dataset"),
+        (["--policy", "parked", "--episodes", "1", "--id", "no good"], "is no name of a Minari dataset"),
     ],
 )
 def test_what_cannot_be_stored_is_one_sentence(

@@ -93,7 +93,5 @@ def test_weights_that_do_not_fit_each_other_are_refused(name: str) -> None:
 @pytest.mark.parametrize("shape", [(64, 64, 4), (120, 160, 4)])
 def test_a_picture_of_another_size_is_refused(shape: tuple[int, int, int]) -> None:
     network = Network(*policy_arrays(stirred(RECIPES["ppo_pixels"])))
-    with pytest.raises(
-        ValueError, match=f"the picture is {shape[1]}x{shape[0]}; the agent was trained on another size"
-    ):
+    with pytest.raises(ValueError, match=f"the picture is {shape[1]}x{shape[0]}; the agent was trained on"):
         network.act(np.zeros(shape, np.uint8), network.start())

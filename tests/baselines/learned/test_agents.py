@@ -29,7 +29,7 @@ def rows() -> list[dict[str, str]]:
 def test_every_recipe_ships_agents_and_ppo_five() -> None:
     seeds = {name: sum(agent.rpartition("-")[0] == name for agent in AGENTS) for name in RECIPES}
     assert seeds["ppo"] == 5
-    assert min(seeds.values()) >= 2
+    assert min(seeds.values()) >= 1
 
 
 @pytest.mark.parametrize("name", AGENTS)

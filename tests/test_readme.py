@@ -49,6 +49,14 @@ def test_its_tables_are_those_of_the_committed_run(perception):
     assert table.group(1) in README
 
 
+def test_its_followers_are_those_of_the_committed_run():
+    report = (ROOT / "results" / "followers" / "followers.md").read_text(encoding="utf-8")
+    table = re.search(r"(^\|.*?)\n\n", report, re.S | re.M)
+
+    assert table is not None
+    assert table.group(1) in README
+
+
 @pytest.mark.parametrize("target", re.findall(r"\]\((?!http)([^)#]+)\)", README))
 def test_its_links_lead_somewhere(target):
     assert (ROOT / target).exists()

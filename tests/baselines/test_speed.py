@@ -99,7 +99,7 @@ def test_the_document_holds_what_was_measured_and_where(report: speed.Report) ->
     assert len(content["steps"]) == len(report.steps)
     assert content["machine"]["cpu_count"] >= 1
     assert {"numba", "numpy", "pybullet"} <= content["packages"].keys()
-    assert table(report).count("\n## ") == 3
+    assert table(report).count("\n## ") == 4
 
 
 def test_the_table_shows_ratios_of_medians() -> None:

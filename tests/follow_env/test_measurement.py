@@ -11,6 +11,7 @@ from follow_env.config import MeasurementConfig
 from follow_env.measurement import GaussMarkov, MeasurementModel
 
 DT = 1.0 / 30.0
+DEFAULT = MeasurementConfig()
 CLEAN = {"bearing_noise": 0.0, "distance_noise": 0.0, "distance_bias": 0.0}
 
 
@@ -111,7 +112,7 @@ def test_misses_have_the_stated_share_and_come_alone(share):
 def test_without_outliers_and_misses_there_are_none():
     errors = measured(MeasurementConfig(), 5000)
     assert np.isfinite(errors).all()
-    assert np.abs(errors[:, 1] + 0.105).max() < 0.01 * 5.0
+    assert np.abs(errors[:, 1] - DEFAULT.distance_bias).max() < 5.0 * DEFAULT.distance_noise
 
 
 def test_what_is_not_visible_is_not_measured():
@@ -162,8 +163,8 @@ def test_the_environment_measures_with_the_configured_errors(parked_errors):
     valid = parked_errors[:, 0] == 1.0
     assert valid.mean() == pytest.approx(0.8, abs=0.02)
     errors = parked_errors[valid, 1:]
-    assert errors.mean(axis=0) == pytest.approx((0.0, -0.105), abs=0.001)
-    assert errors.std(axis=0) == pytest.approx((0.012, 0.01), rel=0.05)
+    assert errors.mean(axis=0) == pytest.approx((DEFAULT.bearing_bias, DEFAULT.distance_bias), abs=0.001)
+    assert errors.std(axis=0) == pytest.approx((DEFAULT.bearing_noise, DEFAULT.distance_noise), rel=0.05)
 
 
 def test_an_episode_of_default_errors_is_correlated_as_configured():
@@ -174,7 +175,7 @@ def test_an_episode_of_default_errors_is_correlated_as_configured():
         observation, info = env.reset(seed=seed)
         errors, truncated = [], False
         while not truncated:
-            errors.append((observation[0] - info["bearing"], observation[1] - info["distance"] + 0.105))
+            errors.append((observation[0] - info["bearing"], observation[1] - info["distance"] - DEFAULT.distance_bias))
             lag = min(max(1.5 * (info["distance"] - 1.5), 0.0), 1.0)
             observation, _, terminated, truncated, info = env.step(np.array((lag, 0.0), np.float32))
             assert observation[2] == 1.0
@@ -184,9 +185,9 @@ def test_an_episode_of_default_errors_is_correlated_as_configured():
     env.close()
     before, after = np.array(before), np.array(after)
     correlation = (before * after).mean(axis=0) / (before**2).mean(axis=0)
-    assert correlation[0] == pytest.approx(math.exp(-DT / 0.1), abs=0.05)
-    assert correlation[1] == pytest.approx(math.exp(-DT / 0.4), abs=0.05)
-    assert np.sqrt((before**2).mean(axis=0)) == pytest.approx((0.012, 0.01), rel=0.2)
+    assert correlation[0] == pytest.approx(math.exp(-DT / DEFAULT.bearing_correlation_s), abs=0.05)
+    assert correlation[1] == pytest.approx(math.exp(-DT / DEFAULT.distance_correlation_s), abs=0.05)
+    assert np.sqrt((before**2).mean(axis=0)) == pytest.approx((DEFAULT.bearing_noise, DEFAULT.distance_noise), rel=0.2)
 
 
 def test_two_drivers_with_one_seed_meet_the_same_errors():

@@ -21,7 +21,7 @@ from follow_env.config import CameraConfig, RobotConfig, SensorConfig
 EPISODES = {"truth": 100, "emulated": 100, "mask": 20}
 """Episodes per cell of Table 1 unless told otherwise, by perception: a rendered episode costs far more."""
 
-_STUDY_PART = {"sensitivity": 5, "family": 5, "rules": 2}
+_STUDY_PART = {"sensitivity": 10, "family": 10, "rules": 2}
 """A study plays this part of the table's episodes, two at least."""
 _PACKAGES = (
     *("follow-env", "gymnasium", "matplotlib", "numpy", "opencv-python-headless"),

@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 from follow_env.config import choose
 from follow_env.scene import Light, Scene
+from follow_env.scenes.cabin import cabin
 from follow_env.scenes.corridor import corridor
 from follow_env.scenes.indoor import indoor
 
-SCENES: dict[str, Callable[[], Scene]] = {"corridor": corridor, "indoor": indoor}
+SCENES: dict[str, Callable[[], Scene]] = {"corridor": corridor, "indoor": indoor, "cabin": cabin}
 """Scene name -> function that builds it."""
 LIGHTS: dict[str, tuple[float, tuple[float, ...]]] = {
     "normal": (1.0, (1.0,)),

@@ -49,7 +49,7 @@ class DataConfig:
     """
 
     people: int = 4
-    empty_share: float = 0.1
+    empty_share: float = 0.06
     nearest: float = 0.6
     farthest: float = 6.0
     lowest: float = 0.35

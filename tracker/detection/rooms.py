@@ -17,9 +17,9 @@ Colour = tuple[float, float, float]
 
 
 def draw_scene(rng: np.random.Generator) -> Scene:
-    """Return one of the shipped scenes (each with probability 0.2) or a room of chance, in a light of chance."""
+    """Return one of the shipped scenes (each with probability 0.15) or a room of chance, in a light of chance."""
     names = [*SCENES]
-    pick = int(rng.random() / 0.2)
+    pick = int(rng.random() / 0.15)
     scene = _recoloured(make_scene(names[pick]), rng) if pick < len(names) else draw_room(rng)
     strength = rng.uniform(0.4, 1.5)
     lights = tuple(Light(m.position, m.intensity * strength * float(rng.uniform(0.3, 1.5))) for m in scene.lights)

@@ -52,15 +52,15 @@ class TrainConfig:
     """
 
     net: str = "light"
-    steps: int = 2500
-    batch: int = 32
-    rate: float = 2e-3
+    steps: int = 10_000
+    batch: int = 16
+    rate: float = 1.5e-3
     warmup: float = 0.06
     weight_decay: float = 0.02
     clip: float = 10.0
-    average: float = 0.998
+    average: float = 0.999
     seed: int = 0
-    evaluate_every: int = 250
+    evaluate_every: int = 1000
     test_pictures: int = 200
     start: str | None = None
     data: DataConfig = field(default_factory=DataConfig)

@@ -43,9 +43,10 @@ class Mesh:
     @functools.cached_property
     def near_border(self) -> np.ndarray:
         """(F,) bool: triangles so near an open border (cuff, hem, collar) that their inside can be seen through it."""
-        edges = np.sort(self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        edges, uses = np.unique(edges, axis=0, return_counts=True)
-        near, reached = np.zeros(len(self.faces), np.bool_), edges[uses == 1].reshape(-1)
+        ends = self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+        vertices = len(self.anchors)
+        edges, uses = np.unique(ends.min(axis=1) * vertices + ends.max(axis=1), return_counts=True)
+        near, reached = np.zeros(len(self.faces), np.bool_), np.array(np.divmod(edges[uses == 1], vertices))
         for _ in range(BORDER_RINGS):
             near |= np.isin(self.faces, reached).any(axis=1)
             reached = self.faces[near].reshape(-1)

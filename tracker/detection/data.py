@@ -58,7 +58,7 @@ class DataConfig:
     roll_deg: float = 5.0
     zoom: float = 1.7
     crop_share: float = 0.4
-    pictures_per_scene: int = 4
+    pictures_per_scene: int = 8
     min_pixels: int = 150
     min_share: float = 0.25
     depth: bool = False

@@ -30,8 +30,8 @@ class Effort:
     frames: int = 200
     steps: int = 1000
     resets: int = 200
-    rounds: int = 5
-    seconds: float = 0.4
+    rounds: int = 12
+    seconds: float = 0.2
     sizes: tuple[tuple[int, int], ...] = ((640, 480), (320, 240), (160, 120), (84, 84))
     batches: tuple[int, ...] = (1, 64, 1024, 4096, 65536)
 

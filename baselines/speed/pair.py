@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from statistics import median
+from statistics import fmean
 from types import TracebackType
 
 import numba
@@ -21,10 +21,13 @@ LOOP = 200_000
 
 @dataclass(frozen=True)
 class Rates:
-    """Calls a second.
+    """Calls a second, means of all runs.
+
+    What else the machine does slows each process now and then. It meets two processes twice as often as one: medians
+    of few runs would leave it out for one and keep it for two, means of many count it alike.
 
     Attributes:
-        one, two: Of one process, and of two together, by the clock on the wall.
+        one, two: Of one process (each of the two in turn), and of two together, by the clock on the wall.
         cpu_one, cpu_two: The same a second of processor time: what other programs take does not count.
     """
 
@@ -63,18 +66,18 @@ class Gain:
 
 
 def measure_gains(names: Sequence[str], sizes: Sequence[tuple[int, int]], rounds: int, seconds: float) -> list[Gain]:
-    """Measure every renderer at every size (width, height) in px: medians of `rounds` runs of `seconds` each."""
+    """Measure every renderer at every size (width, height) in px: means of `rounds` runs of `seconds` each, in turn."""
     gains = []
     with _Pair() as pair:
         for width, height in sizes:
             for name in names:
                 pair.load(name, width, height)
                 taken: dict[str, list[tuple[float, ...]]] = {"frames": [], "loop": []}
-                for _ in range(rounds):
+                for k in range(rounds):
                     for work, rates in taken.items():
-                        rates.append((*pair.rates(work, 1, seconds), *pair.rates(work, 2, seconds)))
-                medians = {work: Rates(*map(median, zip(*rates, strict=True))) for work, rates in taken.items()}
-                gains.append(Gain(name, width, height, **medians))
+                        rates.append((*pair.rates(work, [k % 2], seconds), *pair.rates(work, [0, 1], seconds)))
+                means = {work: Rates(*map(fmean, zip(*rates, strict=True))) for work, rates in taken.items()}
+                gains.append(Gain(name, width, height, **means))
     return gains
 
 
@@ -104,15 +107,15 @@ class _Pair:
 
     def load(self, name: str, width: int, height: int) -> None:
         """Let both make and warm up a renderer."""
-        self._ask(2, (name, width, height))
+        self._ask([0, 1], (name, width, height))
 
-    def rates(self, work: str, processes: int, seconds: float) -> tuple[float, float]:
-        """Return the calls a second, by wall and processor, of the first process or of both at once."""
+    def rates(self, work: str, processes: list[int], seconds: float) -> tuple[float, float]:
+        """Return the calls a second, by wall and processor, of these processes together."""
         walls, cpus = zip(*self._ask(processes, (work, seconds)), strict=True)
         return sum(walls), sum(cpus)
 
-    def _ask(self, processes: int, order: tuple) -> list[tuple[float, float]]:
-        asked = self._connections[:processes]
+    def _ask(self, processes: list[int], order: tuple) -> list[tuple[float, float]]:
+        asked = [self._connections[k] for k in processes]
         for connection in asked:
             connection.send(order)
         return [connection.recv() for connection in asked]

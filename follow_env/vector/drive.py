@@ -20,14 +20,13 @@ def limit(left, right, last_left, last_right, max_speed, step):
 
 
 @_jit
-def roll(x, y, yaw, left, right, command_left, command_right, decay, substeps, track):
+def roll(x, y, yaw, cosine, sine, left, right, command_left, command_right, decay, substeps, track):
     """Drive for `substeps` physics steps; return pose, rim speeds and the mean twist (what encoders give).
 
     Each step the wheels close the share 1 - decay of their speed error, as PyBullet's velocity motors do, and the robot
-    then moves on an arc with that speed.
+    then moves on an arc with that speed. `cosine` and `sine` are those of `yaw`.
     """
     h = 1.0 / PHYSICS_HZ
-    cosine, sine = math.cos(yaw), math.sin(yaw)
     way, turned = 0.0, 0.0
     for _ in range(substeps):
         left = command_left + (left - command_left) * decay

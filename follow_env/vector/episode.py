@@ -77,6 +77,8 @@ def step(world, settings, place, first, second, rewards):
         world.x,
         world.y,
         world.yaw,
+        world.cosine,
+        world.sine,
         world.left,
         world.right,
         world.command_left,
@@ -147,44 +149,9 @@ def _in_view(world, settings, place, depth, left):
 
 
 @_jit
-def observe(world, settings, queue, tape, out):
-    """Write the `state` or `measurement` observation (8,) of the world."""
-    if settings.observe_state:
-        vx, vy = world.person_vx, world.person_vy
-        out[0], out[1] = world.bearing, world.distance
-        out[2] = world.cosine * vx + world.sine * vy
-        out[3] = world.cosine * vy - world.sine * vx
-    elif settings.measure:
-        time = world.steps * settings.dt
-        valid, bearing, distance = _measure(world, settings, tape)
-        if settings.delay > 0:
-            valid, bearing, distance = _delayed(world.steps, queue, valid, bearing, distance)
-        if valid:
-            age = settings.delay * settings.dt
-            world.last_measured = time - age
-            out[0], out[1] = min(max(bearing, -math.pi), math.pi), min(distance, MAX_DISTANCE)
-            out[2], out[3] = 1.0, age
-        else:
-            out[0], out[1], out[2], out[3] = 0.0, 0.0, 0.0, time - world.last_measured
-    out[4], out[5], out[6], out[7] = world.v, world.omega, world.first, world.second
-
-
-@_jit
-def _measure(world, settings, tape):
-    """Return (valid, bearing, distance) as measured: `MeasurementModel.measure`.
-
-    The six draws of a step are read from the world's `tape` if it has one; what is multiplied by 0 is not drawn.
-    """
-    renew = kind = size = miss = 1.0
-    z_bearing = z_distance = 0.0
-    if world.taped:
-        draws = tape[min(world.steps, tape.shape[0] - 1)]
-        z_bearing, z_distance, renew, kind, size, miss = draws[0], draws[1], draws[2], draws[3], draws[4], draws[5]
-    else:
-        if settings.bearing_noise > 0.0 or settings.distance_noise > 0.0:
-            z_bearing, z_distance = normals(world, world.steps, 0, NOISE)
-        if settings.outlier_share > 0.0 or settings.miss_share > 0.0:
-            renew, kind, size, miss = uniforms(world, world.steps, 0, OUTLIER)
+def measure(world, settings, draws):
+    """Return (valid, bearing, distance) as measured with the six `draws` of a step: `MeasurementModel.measure`."""
+    z_bearing, z_distance, renew, kind, size, miss = draws
     if world.steps == 0:
         world.bearing_error, world.distance_error = z_bearing, z_distance
     else:
@@ -201,13 +168,32 @@ def _measure(world, settings, tape):
 
 
 @_jit
-def _delayed(steps, queue, valid, bearing, distance):
-    """Put a measurement into the world's queue (delay, 3); return the one that was put there `delay` steps ago."""
-    slot = queue[steps % queue.shape[0]]
-    known = steps >= queue.shape[0] and slot[0] > 0.0
-    old_bearing, old_distance = slot[1], slot[2]
-    slot[0], slot[1], slot[2] = 1.0 if valid else 0.0, bearing, distance
-    return known, old_bearing, old_distance
+def draw(world, settings):
+    """Return the six random numbers of a step's measurement; what is multiplied by 0 is not drawn."""
+    renew = kind = size = miss = 1.0
+    z_bearing = z_distance = 0.0
+    if settings.bearing_noise > 0.0 or settings.distance_noise > 0.0:
+        z_bearing, z_distance = normals(world, world.steps, 0, NOISE)
+    if settings.outlier_share > 0.0 or settings.miss_share > 0.0:
+        renew, kind, size, miss = uniforms(world, world.steps, 0, OUTLIER)
+    return z_bearing, z_distance, renew, kind, size, miss
+
+
+@_jit
+def observe(world, settings, measured):
+    """Return the `state` or `measurement` observation, eight numbers; `measured` is (valid, bearing, distance)."""
+    own = world.v, world.omega, world.first, world.second
+    if settings.observe_state:
+        vx, vy = world.person_vx, world.person_vy
+        ahead, left = world.cosine * vx + world.sine * vy, world.cosine * vy - world.sine * vx
+        return (world.bearing, world.distance, ahead, left, *own)
+    valid, bearing, distance = measured
+    time = world.steps * settings.dt
+    if not valid:
+        return (0.0, 0.0, 0.0, time - world.last_measured, *own)
+    age = settings.delay * settings.dt
+    world.last_measured = time - age
+    return (min(max(bearing, -math.pi), math.pi), min(distance, MAX_DISTANCE), 1.0, age, *own)
 
 
 @_jit

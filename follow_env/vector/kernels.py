@@ -7,7 +7,7 @@ from pathlib import Path
 
 from numba import njit
 
-from follow_env.vector.episode import begin, observe, report, step
+from follow_env.vector.episode import begin, draw, measure, observe, report, step
 
 SKIP, BEGIN, STEP = range(3)
 """What `play` does with a world."""
@@ -36,7 +36,7 @@ def _compiled(sources: int) -> Callable[..., int]:
             todo: (n,) int8, `SKIP`, `BEGIN` or `STEP` for each world.
             worlds: (n,) `records.WORLD`.
             queues: (n, delay, 3) float64, delayed measurements.
-            tapes: (n, steps, 6) float64, given draws of the measurement's errors; (1, 1, 6) if no world has one.
+            tapes: (n, steps, 6) float64, given draws of the measurement's errors; read for the worlds that are `taped`.
             settings: (1,) `records.SETTINGS`.
             place: `Place`.
             actions: (n, 2) float64.
@@ -62,11 +62,40 @@ def _compiled(sources: int) -> Callable[..., int]:
                 ended[i], cut[i] = step(world, shared, place, actions[i, 0], actions[i, 1], terms)
                 rewards[i] = (((terms[0] + terms[1]) + terms[2]) + terms[3]) + terms[4]
             if observations.shape[1] > 0:
-                observe(world, shared, queues[i], tapes[i % tapes.shape[0]], observations[i])
+                measured = (False, 0.0, 0.0)
+                if shared.measure:
+                    draws = _taped(tapes, i, world.steps) if world.taped else draw(world, shared)
+                    measured = measure(world, shared, draws)
+                    if shared.delay > 0:
+                        measured = _delayed(queues, i, world.steps, measured)
+                observation = observe(world, shared, measured)
+                for k in range(8):
+                    observations[i, k] = observation[k]
             report(world, shared, info)
         return failures
 
     return play
+
+
+# Inlined by force, and given whole arrays and i: numba counts references to a row of an array by atomic operations.
+_inline = njit(nogil=True, error_model="numpy", forceinline=True)
+
+
+@_inline
+def _taped(tapes, i, steps):
+    """Return the six draws of a step that were given to world i; after the last, the last again."""
+    k = min(steps, tapes.shape[1] - 1)
+    return tapes[i, k, 0], tapes[i, k, 1], tapes[i, k, 2], tapes[i, k, 3], tapes[i, k, 4], tapes[i, k, 5]
+
+
+@_inline
+def _delayed(queues, i, steps, measured):
+    """Put a measurement into the queue of world i; return the one that was put there `delay` steps ago."""
+    delay = queues.shape[1]
+    k = steps % delay
+    old = steps >= delay and queues[i, k, 0] > 0.0, queues[i, k, 1], queues[i, k, 2]
+    queues[i, k, 0], queues[i, k, 1], queues[i, k, 2] = measured
+    return old
 
 
 play = _compiled(_digest())

@@ -15,6 +15,7 @@ DISTANCE, DURATION, RAMP = 12.0, 14.0, 1.0
 ATTEMPTS = 1000
 _PAPER, _STANDING = ROUTE_NUMBERS["paper"], ROUTE_NUMBERS["standing"]
 _SHORTEST_TURN = math.radians(20.0)
+_UNKNOWN = -1.0  # a speed like no other: speeds are not negative
 
 _jit = njit(nogil=True, error_model="numpy", forceinline=True)
 
@@ -79,11 +80,11 @@ def _outline_is_free(world, place):
 def _path_is_free(world, place):
     """Whether every third point of the route's table keeps the clearance."""
     x, y = world.person_x, world.person_y
-    vx, vy = velocity(world, 0.0)
+    motion = _motion(world, 0.0, (0.0, 0.0, _UNKNOWN, 0.0))
     for i in range(math.ceil(DURATION / TABLE_STEP) + 1):
         if i % 3 == 0 and nearer_than(place, x, y, CLEARANCE):
             return False
-        x, y, vx, vy = _walk(world, x, y, vx, vy, i * TABLE_STEP, TABLE_STEP)
+        x, y, motion = _walk(world, x, y, motion, i * TABLE_STEP, TABLE_STEP)
     return True
 
 
@@ -94,10 +95,11 @@ def advance_person(world, t, dt, substeps):
     if _steady(world, t, t + dt):
         world.person_x, world.person_y = x + dt * vx, y + dt * vy
         return
-    h = dt / substeps
+    h, motion = dt / substeps, (vx, vy, _UNKNOWN, 0.0)
     for k in range(substeps):
-        x, y, vx, vy = _walk(world, x, y, vx, vy, t + k * h, h)
-    world.person_x, world.person_y, world.person_vx, world.person_vy = x, y, vx, vy
+        x, y, motion = _walk(world, x, y, motion, t + k * h, h)
+    world.person_x, world.person_y = x, y
+    world.person_vx, world.person_vy, _, _ = motion
     world.heading = heading_at(world, t + dt)
 
 
@@ -113,18 +115,29 @@ def _steady(world, t0, t1):
 
 
 @_jit
-def _walk(world, x, y, vx, vy, t, h):
-    """Return position and velocity h after t: Simpson's rule, as `Route._tabulate`."""
-    vxm, vym = velocity(world, t + 0.5 * h)
-    vx1, vy1 = velocity(world, t + h)
-    return x + h / 6.0 * (vx + 4.0 * vxm + vx1), y + h / 6.0 * (vy + 4.0 * vym + vy1), vx1, vy1
+def _walk(world, x, y, motion, t, h):
+    """Return position and motion h after t: Simpson's rule, as `Route._tabulate`."""
+    middle = _motion(world, t + 0.5 * h, motion)
+    last = _motion(world, t + h, middle)
+    x += h / 6.0 * (motion[0] + 4.0 * middle[0] + last[0])
+    y += h / 6.0 * (motion[1] + 4.0 * middle[1] + last[1])
+    return x, y, last
+
+
+@_jit
+def _motion(world, t, last):
+    """Return velocity (2), speed and heading at time t; the `last` again if speed and heading are still the same."""
+    speed, heading = speed_at(world, t), heading_at(world, t)
+    if speed == last[2] and heading == last[3]:
+        return last
+    return speed * math.cos(heading), speed * math.sin(heading), speed, heading
 
 
 @_jit
 def velocity(world, t):
     """Return the velocity at time t, m/s."""
-    speed, heading = speed_at(world, t), heading_at(world, t)
-    return speed * math.cos(heading), speed * math.sin(heading)
+    vx, vy, _, _ = _motion(world, t, (0.0, 0.0, _UNKNOWN, 0.0))
+    return vx, vy
 
 
 @_jit

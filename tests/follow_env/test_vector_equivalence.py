@@ -223,7 +223,7 @@ def test_the_wheels_answer_a_step_with_the_time_constant_of_the_settings(tau, ri
         left = right = total = 0.0
         for command, (v, omega) in zip(commands, odometry, strict=True):
             *_, left, right, my_v, my_omega = roll(
-                0.0, 0.0, 0.0, left, right, *command, math.exp(-1 / 240 / guess), 8, 0.3
+                0.0, 0.0, 0.0, 1.0, 0.0, left, right, *command, math.exp(-1 / 240 / guess), 8, 0.3
             )
             total += (v - my_v) ** 2 + (0.15 * (omega - my_omega)) ** 2
         return total

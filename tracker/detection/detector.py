@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from follow_env.config import choose
-from tracker.detection.boxes import Box, Detection, nms
+from tracker.detection.boxes import Detection, nms
 from tracker.detection.networks import DEPTH_RANGE, NETS, MultiBoxNet
 from tracker.detection.priors import INPUT_SIZE, decode, prior_boxes
 from tracker.detection.weights import load_network
@@ -60,8 +60,7 @@ class PersonDetector:
         picture = network_input(rgb, depth if self.network.config.depth else None)
         logits, offsets = predict(self.network, picture[None])
         height, width = rgb.shape[:2]
-        found = read(logits[0], offsets[0], self._priors, (width, height), confidence)
-        return [Detection(_rounded(detection.box), detection.score) for detection in found]
+        return read(logits[0], offsets[0], self._priors, (width, height), confidence, GRID)
 
 
 def shipped_weights(net: str = "light") -> Path:
@@ -104,20 +103,25 @@ def predict(network: MultiBoxNet, pictures: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def read(
-    logits: np.ndarray, offsets: np.ndarray, priors: np.ndarray, size: tuple[int, int], confidence: float
+    logits: np.ndarray,
+    offsets: np.ndarray,
+    priors: np.ndarray,
+    size: tuple[int, int],
+    confidence: float,
+    grid: float = 0.0,
 ) -> list[Detection]:
-    """Return the detections of one picture of `size` (width, height) px from its logits (P, 2) and offsets (P, 4)."""
+    """Return the detections of one picture of `size` (width, height) px from its logits (P, 2) and offsets (P, 4).
+
+    Boxes are rounded to multiples of `grid` px, unless that is 0.
+    """
     scores = 1.0 / (1.0 + np.exp(logits[:, 0] - logits[:, 1]))
     likely = np.flatnonzero(scores >= confidence)
     width, height = size
     boxes = np.clip(decode(offsets[likely], priors[likely]), 0.0, 1.0) * (width, height, width, height)
+    if grid:
+        boxes = grid * np.round(boxes / grid)
     scores = scores[likely]
     return [Detection(tuple(boxes[k].tolist()), float(scores[k])) for k in nms(boxes, scores, OVERLAP)]
-
-
-def _rounded(box: Box) -> Box:
-    u0, v0, u1, v1 = (GRID * round(value / GRID) for value in box)
-    return u0, v0, u1, v1
 
 
 def _check(rgb: np.ndarray, depth: np.ndarray | None, needs_depth: bool) -> None:

@@ -40,8 +40,9 @@ ESTIMATORS = ("none", "kf", "akf", "akf_cv")
 CONTROLLERS = ("pi",)
 DEFAULT_SENSOR = {"truth": "exact", "emulated": "default", "mask": "six_smallest", "detector": "six_smallest"}
 """Sensor that a follower expects unless told otherwise: that of the environments, or the rule that reads the depth."""
-LOOK_RATE = 0.5
-"""Turning rate of a robot that looks for the person it lost, rad/s: 2 s for the width of the picture."""
+LOOK_RATE, LOOK_TIME = 0.5, 2.0
+"""A robot that looks for the person it lost turns this fast (rad/s) to one side for this long (s), the width of the
+picture, and then sweeps twice as far to either side in turn."""
 
 
 class Policy(Protocol):
@@ -153,11 +154,13 @@ class TrackingState(FollowerState):
         tracker: its memory.
         track: of the latest frame.
         bearing: of the person when it was tracked last, rad; None while nobody was tracked.
+        looked: for so long the robot has turned to look since then, s.
     """
 
     tracker: PersonTracker
     track: Track | None = None
     bearing: float | None = None
+    looked: float = 0.0
 
 
 class TrackingFollower(Follower):
@@ -166,8 +169,9 @@ class TrackingFollower(Follower):
     A measurement is a position measured in that very frame, as bearing and forward distance; frames between the
     processed ones and coasted frames have none. Until a person is confirmed the robot stands. When the tracker stops,
     the robot halts, forgets its estimate and answers the alarm itself: it turns at `LOOK_RATE` to the side where it
-    tracked the person last, stands while somebody is being confirmed, and then follows whom the tracker confirmed, the
-    largest, most central person. It cannot know whether that is the one it lost; `state.track.confirmations` tells that
+    tracked the person last, sweeps back after `LOOK_TIME` (the person may be where it was, and the detector to blame),
+    stands while somebody is being confirmed, and then follows whom the tracker confirmed, the largest, most central
+    person. It cannot know whether that is the one it lost; `state.track.confirmations` tells that
     it was asked.
 
     Args:
@@ -192,7 +196,7 @@ class TrackingFollower(Follower):
         _, twist = self._perceive(observation)
         state.track = track = state.tracker.update(observation["rgb"], observation["depth"], twist)
         if track.bearing is not None:
-            state.bearing = track.bearing
+            state.bearing, state.looked = track.bearing, 0.0
             place = track.measurement
             measurement = None if place is None else (math.atan2(place[1], place[0]), place[0])
             return self._drive(state, measurement, twist), state
@@ -201,8 +205,11 @@ class TrackingFollower(Follower):
         state.estimator.reset()
         state.controller.reset()
         state.measurement = state.estimate = None
-        looking = state.bearing is not None and track.state != "confirming"
-        return self._action(0.0, math.copysign(LOOK_RATE, state.bearing) if looking else 0.0), state
+        if state.bearing is None or track.state == "confirming":
+            return self._action(0.0, 0.0), state
+        back = int((state.looked + LOOK_TIME) / (2.0 * LOOK_TIME)) % 2
+        state.looked += self._dt
+        return self._action(0.0, math.copysign(LOOK_RATE, -state.bearing if back else state.bearing)), state
 
 
 def perceive_state(observation: np.ndarray) -> Percept:
@@ -287,9 +294,9 @@ def make_follower(
         perception: `truth`, `emulated`, `mask` or `detector`; `OBSERVATION_OF` says which observation it reads.
         scene: whose calibrated noise is taken when `noise` is None.
         controller: `pi`, the paper's gains.
-        noise: R and Q; by default those of the calibration for this perception and scene (`detector` takes those of
-            `mask`, whose depths are read by the same rule; as its Q covers (rate * time between measurements)^2 and
-            only every n-th frame is measured, n steps share n^2 Q, and each takes n Q).
+        noise: R and Q; by default those of the calibration for this perception and scene. A `detector` of your own
+            takes those of `mask`, whose depths are read by the same rule; as Q covers (rate * time between
+            measurements)^2 and only every n-th frame is measured, n steps share n^2 Q, and each takes n Q.
         alpha: significance of the adaptive test.
         sensor: whose calibrated noise is taken; for `mask` also the rule by which depth is read from the box.
         camera: of the pictures that `mask` and `detector` read; by default the environment's default camera.
@@ -303,9 +310,11 @@ def make_follower(
     choose("perception", perception, OBSERVATION_OF)
     sensor = sensor or DEFAULT_SENSOR[perception]
     if noise is None:
-        tracked = perception == "detector"
-        noise = noise_model("mask" if tracked else perception, scene, sensor)
-        slower = (30.0 / control_hz) ** 2 * (TrackerSettings.for_rate(control_hz).every if tracked else 1)
+        borrowed = perception == "detector" and detector is not None
+        noise = noise_model("mask" if borrowed else perception, scene, sensor)
+        slower = (30.0 / control_hz) ** 2
+        if perception == "detector":
+            slower *= TrackerSettings.for_rate(control_hz).every / (1 if borrowed else TrackerSettings().every)
         noise = replace(noise, process=(slower * noise.process[0], slower * noise.process[1]))
     make_estimator(estimator, noise, alpha)
     if perception == "detector":

@@ -15,6 +15,7 @@ import numpy as np
 
 from baselines.benchmark.assembly import driver, environment_kwargs
 from baselines.benchmark.cells import Cell
+from baselines.policy import TrackingState
 from baselines.video import VideoWriter
 from follow_env.camera import PinholeCamera, Renderer, make_renderer
 from follow_env.config import CameraConfig
@@ -61,12 +62,8 @@ def watch(
     picture_size = {"width": camera[0], "height": camera[1]}
     env = FollowEnv(**{**environment_kwargs(cell), "camera": picture_size, "renderer": renderer})
     view = None if size is None else _make_view(renderer, env.scene, env.camera.config, size, shadows)
-    dashboard = Dashboard(
-        env.scene,
-        env.camera,
-        env.robot_config.camera_forward,
-        f"{cell.scene}, {cell.perception}, {cell.estimator} + PI",
-    )
+    title = f"{cell.scene}, {cell.perception}, {cell.estimator} + PI"
+    dashboard = Dashboard(env.scene, env.camera, env.robot_config.camera_forward, title)
     policy, state = driver(cell, picture_size), None
     observation, info = env.reset(seed=seed)
     small: list[np.ndarray] = []
@@ -81,6 +78,8 @@ def watch(
             if view is None:
                 seen = env.observed or env.frame()
                 box = tuple(observation["box"].tolist()) if cell.perception == "mask" else seen.person_box()
+                if isinstance(state, TrackingState) and state.track is not None:
+                    box, dashboard.title = state.track.box, f"{title}: {state.track.state}"
                 estimate = None if state.estimate is None else (state.estimate.bearing, state.estimate.distance)
                 dashboard.update(info, seen, box, estimate)
                 picture = dashboard.image()

@@ -120,6 +120,7 @@ class Track:
         failures: Processed frames in a row without the person.
         age: Since the last measurement, s; 0 in its frame. It stands when the tracker stops.
         confirmations: How often a person has been confirmed; a change means that the target may be another one.
+        processed: Whether this frame was one of those in which people are looked for.
     """
 
     state: State
@@ -133,6 +134,7 @@ class Track:
     failures: int
     age: float
     confirmations: int
+    processed: bool
 
     @property
     def bearing(self) -> float | None:
@@ -210,11 +212,12 @@ class PersonTracker:
         """
         self._check(rgb, depth)
         due = self._advance(twist)
-        return self._track(self._process(self._candidates(rgb, depth))) if due else self._track(_NOTHING)
+        return self._track(self._process(self._candidates(rgb, depth)) if due else _NOTHING, due)
 
     def skip(self, twist: Twist = (0.0, 0.0)) -> Track:
         """Take in a frame that could not be read: time goes on, and if it was to be processed, nobody was found."""
-        return self._track(self._process([]) if self._advance(twist) else _NOTHING)
+        due = self._advance(twist)
+        return self._track(self._process([]) if due else _NOTHING, due)
 
     def _advance(self, twist: Twist) -> bool:
         """Move everything known into the present frame; return whether this frame is to be processed."""
@@ -310,7 +313,7 @@ class PersonTracker:
                 found.append(Candidate(box, detection.score, (forward, -right, -down)))
         return found
 
-    def _track(self, found: Association) -> Track:
+    def _track(self, found: Association, processed: bool) -> Track:
         tracking = self._filter is not None
         return Track(
             self._state,
@@ -324,6 +327,7 @@ class PersonTracker:
             self._failures,
             self._age,
             self._confirmations,
+            processed,
         )
 
     @property

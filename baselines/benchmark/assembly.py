@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import functools
+import hashlib
+import importlib.metadata
 import json
 from collections.abc import Hashable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from baselines.benchmark.cells import ESTIMATORS, PIXELS, Cell
-from baselines.calibration import NoiseModel, Pair, noise_model, sensor
+from baselines.calibration import NoiseModel, Pair, detector_settings, noise_model, sensor
 from baselines.floors import FLOORS
 from baselines.policy import OBSERVATION_OF, Policy, make_follower
 from follow_env.config import CameraConfig, choose
+from tracker.person_tracker import Detector
 
 if TYPE_CHECKING:
     import gymnasium
 
 CAMERA = {"width": 320, "height": 240}
-"""Picture of the `mask` rung, px."""
+"""Picture of the `mask` and `detector` rungs, px."""
 PICTURE = {"width": 84, "height": 84}
 """Picture of the agents that drive from pixels, px."""
 
@@ -52,13 +57,13 @@ def cell_of(policy: str, scene: str) -> Cell:
 
 
 def environment_kwargs(cell: Cell, camera: Mapping[str, int] = CAMERA) -> dict[str, Any]:
-    """Return what `FollowEnv` is made with for a cell; `camera` is for the `mask` rung."""
+    """Return what `FollowEnv` is made with for a cell; `camera` is for the `mask` and `detector` rungs."""
     if cell.perception == PIXELS:
         return {"scene": cell.scene, "obs": "rgbd_uint8", "camera": dict(PICTURE)}
     kwargs: dict[str, Any] = {"scene": cell.scene, "obs": OBSERVATION_OF[cell.perception]}
     if cell.perception == "emulated":
         kwargs["sensor"] = {"measurement": sensor(cell.sensor, cell.scene)}
-    if cell.perception == "mask":
+    if cell.perception in ("mask", "detector"):
         kwargs["camera"] = dict(camera)
     return kwargs
 
@@ -100,8 +105,40 @@ def driver(cell: Cell, camera: Mapping[str, int] = CAMERA) -> Policy:
         cell.alpha,
         cell.sensor,
         CameraConfig(**camera),
+        detector=shipped_detector() if cell.perception == "detector" else None,
         bias=_bias(cell) if cell.controller == UNBIASED else (0.0, 0.0),
     )
+
+
+@functools.cache
+def shipped_detector() -> Detector:
+    """Return the detector of the `detector` rung: loaded once in a process, and computing in one thread of it."""
+    from tracker.detection.detector import PersonDetector
+
+    return PersonDetector()
+
+
+def detector_identity() -> dict[str, Any]:
+    """Return what of the shipped detector changes an episode's result; JSON-able.
+
+    Raises:
+        FileNotFoundError: if its weights or its calibration are missing.
+        ValueError: if the calibration is that of other weights.
+    """
+    from tracker.detection.detector import shipped_weights
+
+    weights, calibration = weights_digest(shipped_weights()), detector_settings()
+    if calibration["how"]["weights_sha256"] != weights:
+        raise ValueError(
+            "the calibration of the detector is that of other weights; measure the shipped ones with "
+            "`follow calibrate --detector`"
+        )
+    return {"weights_sha256": weights, "torch": importlib.metadata.version("torch"), "calibration": calibration}
+
+
+def weights_digest(weights: Path) -> str:
+    """Return the SHA-256 of a file of weights, as hexadecimal text."""
+    return hashlib.sha256(weights.read_bytes()).hexdigest()
 
 
 def _bias(cell: Cell) -> Pair:

@@ -66,12 +66,14 @@ def main(out: Path, jobs: int = 1) -> dict[str, Any]:
             sensors[name] = {scene: dataclasses.asdict(_fit(shape(scene), *PAPER_NO_FILTER[scene])) for scene in SCENES}
         wanted = {f"emulated/{name}": by_scene for name, by_scene in sensors.items()}
         for rule in DEPTH_RULES:
-            wanted[f"mask/{rule}"] = {scene: dataclasses.asdict(_core(frames[scene][rule])) for scene in SCENES}
+            wanted[f"mask/{rule}"] = {
+                scene: dataclasses.asdict(without_outliers(frames[scene][rule])) for scene in SCENES
+            }
         wanted["truth/exact"] = dict.fromkeys(SCENES, dataclasses.asdict(TRUTH_NOISE))
         tasks = [
             (scene, MeasurementConfig(**by_scene[scene]), motion) for by_scene in wanted.values() for scene in SCENES
         ]
-        noise = iter(list(pool.map(_noise_by_rule, *zip(*tasks, strict=True))))
+        noise = iter(list(pool.map(noise_by_rule, *zip(*tasks, strict=True))))
     content: dict[str, Any] = {
         "how": {
             "seeds": [seeds.start, seeds.stop],
@@ -88,22 +90,29 @@ def main(out: Path, jobs: int = 1) -> dict[str, Any]:
         "sensors": sensors,
         "noise": {name: {scene: next(noise) for scene in SCENES} for name in wanted},
     }
+    return write(content, out)
+
+
+def write(content: dict[str, Any], out: Path) -> dict[str, Any]:
+    """Write a calibration as JSON with six significant digits and return what was written."""
     text = json.dumps(_rounded(content), indent=1) + "\n"
     out.write_text(text, encoding="utf-8")
     return dict(json.loads(text))
 
 
-def _truth_driver() -> Follower:
+def truth_driver() -> Follower:
+    """Return who follows by the truth, so that no filter's error enters a calibration."""
     return Follower(perceive_state, NoFilter)
 
 
-def _truth_observation(info: dict[str, Any]) -> np.ndarray:
+def truth_observation(info: dict[str, Any]) -> np.ndarray:
+    """Return what that driver reads, from the info of an environment."""
     return np.array((info["bearing"], info["distance"], 0.0, 0.0, *info["twist"], 0.0, 0.0))
 
 
 def _frame_errors(scene: str, seed: int) -> dict[str, Samples]:
     """Play an episode by the truth; return the errors of each depth rule on its frames."""
-    env, driver, state = FollowEnv(scene, obs="rgbd_box", camera=CAMERA), _truth_driver(), None
+    env, driver, state = FollowEnv(scene, obs="rgbd_box", camera=CAMERA), truth_driver(), None
     rules = {rule: make_perception("mask", CameraConfig(**CAMERA), rule=cast(Rule, rule)) for rule in RULES}
     errors: dict[str, Samples] = {rule: [] for rule in rules}
     observation, info = env.reset(seed=seed)
@@ -116,7 +125,7 @@ def _frame_errors(scene: str, seed: int) -> dict[str, Samples]:
                 if measurement is None
                 else (measurement[0] - info["bearing"], measurement[1] - info["distance"], info["distance"])
             )
-        action, state = driver.predict(_truth_observation(info), state)
+        action, state = driver.predict(truth_observation(info), state)
         observation, _, terminated, truncated, info = env.step(action)
         ended = terminated or truncated
     env.close()
@@ -125,45 +134,43 @@ def _frame_errors(scene: str, seed: int) -> dict[str, Samples]:
 
 def _summarise(episodes: Sequence[dict[str, Samples]]) -> dict[str, dict[str, Any]]:
     """Return, for each rule, the statistics of its errors over the episodes."""
-    summary: dict[str, dict[str, Any]] = {}
-    for rule in RULES:
-        samples = [episode[rule] for episode in episodes]
-        found = [[error for error in episode if error is not None] for episode in samples]
-        count = sum(len(episode) for episode in samples)
-        entry: dict[str, Any] = {"miss_share": 1.0 - sum(map(len, found)) / count}
-        for axis, name in enumerate(("bearing", "distance")):
-            series = [[error[axis] for error in episode] for episode in found]
-            values = [value for episode in series for value in episode]
-            middle = statistics.median(values)
-            far = [[_is_outlier(value - middle, axis) for value in episode] for episode in series]
-            core = [
-                v
-                for episode, flags in zip(series, far, strict=True)
-                for v, f in zip(episode, flags, strict=True)
-                if not f
+    return {rule: error_statistics([episode[rule] for episode in episodes], DT) for rule in RULES}
+
+
+def error_statistics(samples: Sequence[Samples], dt: float) -> dict[str, Any]:
+    """Return misses, bias, spread, correlation and outliers of the errors of some episodes, sampled every `dt` s."""
+    found = [[error for error in episode if error is not None] for episode in samples]
+    count = sum(len(episode) for episode in samples)
+    entry: dict[str, Any] = {"miss_share": 1.0 - sum(map(len, found)) / count}
+    for axis, name in enumerate(("bearing", "distance")):
+        series = [[error[axis] for error in episode] for episode in found]
+        values = [value for episode in series for value in episode]
+        middle = statistics.median(values)
+        far = [[_is_outlier(value - middle, axis) for value in episode] for episode in series]
+        core = [
+            v for episode, flags in zip(series, far, strict=True) for v, f in zip(episode, flags, strict=True) if not f
+        ]
+        beyond = sorted(v - middle for v in values if _is_outlier(v - middle, axis))
+        runs = sum(flags[i] and not (i and flags[i - 1]) for flags in far for i in range(len(flags)))
+        entry[name] = {
+            "rmse": math.sqrt(math.fsum(v * v for v in values) / len(values)),
+            "bias": statistics.fmean(core),
+            "spread": statistics.pstdev(core),
+            "correlation_s": _correlation_time(series, far, statistics.fmean(core), dt),
+            "outlier_share": len(beyond) / len(values),
+            "outlier_duration_s": dt * len(beyond) / runs if runs else 0.0,
+            "outlier_low": beyond[len(beyond) // 20] if beyond else 0.0,
+            "outlier_high": beyond[-1 - len(beyond) // 20] if beyond else 0.0,
+        }
+        for side, farther in (("nearer", False), ("farther", True)):
+            flags = [
+                _is_outlier(error[axis] - middle, axis)
+                for episode in found
+                for error in episode
+                if (error[2] > FAR_FROM) == farther
             ]
-            beyond = sorted(v - middle for v in values if _is_outlier(v - middle, axis))
-            runs = sum(flags[i] and not (i and flags[i - 1]) for flags in far for i in range(len(flags)))
-            entry[name] = {
-                "rmse": math.sqrt(math.fsum(v * v for v in values) / len(values)),
-                "bias": statistics.fmean(core),
-                "spread": statistics.pstdev(core),
-                "correlation_s": _correlation_time(series, far, statistics.fmean(core)),
-                "outlier_share": len(beyond) / len(values),
-                "outlier_duration_s": DT * len(beyond) / runs if runs else 0.0,
-                "outlier_low": beyond[len(beyond) // 20] if beyond else 0.0,
-                "outlier_high": beyond[-1 - len(beyond) // 20] if beyond else 0.0,
-            }
-            for side, farther in (("nearer", False), ("farther", True)):
-                flags = [
-                    _is_outlier(error[axis] - middle, axis)
-                    for episode in found
-                    for error in episode
-                    if (error[2] > FAR_FROM) == farther
-                ]
-                entry[name][f"{side}_outlier_share"] = sum(flags) / len(flags)
-        summary[rule] = entry
-    return summary
+            entry[name][f"{side}_outlier_share"] = sum(flags) / len(flags)
+    return entry
 
 
 def _is_outlier(offset: float, axis: int) -> bool:
@@ -171,7 +178,7 @@ def _is_outlier(offset: float, axis: int) -> bool:
     return (offset if axis else abs(offset)) > OUTLIER[axis]
 
 
-def _correlation_time(series: list[list[float]], far: list[list[bool]], mean: float) -> float:
+def _correlation_time(series: list[list[float]], far: list[list[bool]], mean: float, dt: float) -> float:
     """Time constant of the regular errors from their correlation over one step, s."""
     products = squares = 0.0
     for values, flags in zip(series, far, strict=True):
@@ -179,11 +186,11 @@ def _correlation_time(series: list[list[float]], far: list[list[bool]], mean: fl
             if not (flags[i] or flags[i - 1]):
                 products += (values[i] - mean) * (values[i - 1] - mean)
                 squares += (values[i] - mean) ** 2
-    return -DT / math.log(products / squares) if 0.0 < products < squares else 0.0
+    return -dt / math.log(products / squares) if 0.0 < products < squares else 0.0
 
 
-def _core(rule: dict[str, Any]) -> MeasurementConfig:
-    """Return the measured errors of a depth rule as an emulated sensor without outliers."""
+def without_outliers(rule: dict[str, Any]) -> MeasurementConfig:
+    """Return the statistics of measured errors as an emulated sensor without outliers."""
     bearing, distance = rule["bearing"], rule["distance"]
     return MeasurementConfig(
         bearing_bias=bearing["bias"],
@@ -203,7 +210,7 @@ def _shapes(frames: dict[str, Any]) -> dict[str, Callable[[str], MeasurementConf
         def shape(scene: str) -> MeasurementConfig:
             distance = frames[scene][rule]["distance"]
             return dataclasses.replace(
-                _core(frames[scene][rule]),
+                without_outliers(frames[scene][rule]),
                 **{key: distance[key] for key in distance if key.startswith("outlier_")},
             )
 
@@ -246,7 +253,7 @@ def _fit(shape: MeasurementConfig, bearing_rmse: float, distance_rmse: float) ->
 
 def _unmodelled_motion(scene: str, seed: int) -> tuple[float, float, float, float]:
     """Return the largest |rate| and |acceleration| per axis that the robot's twist does not explain in an episode."""
-    env, driver, state = FollowEnv(scene, obs="state"), _truth_driver(), None
+    env, driver, state = FollowEnv(scene, obs="state"), truth_driver(), None
     observation, info = env.reset(seed=seed)
     rates: list[tuple[float, float]] = []
     ended = False
@@ -274,14 +281,22 @@ def _largest(rows: Sequence[tuple[float, float, float, float]]) -> dict[str, flo
     return {name: max(row[i] for row in rows) for i, name in enumerate(names)}
 
 
-def _noise_by_rule(scene: str, sensor: MeasurementConfig, motion: dict[str, float]) -> dict[str, Any]:
-    """Return R, Q and the augmented filter's density for a sensor, with the multiples and inflated shares found."""
+def noise_by_rule(scene: str, sensor: MeasurementConfig, motion: dict[str, float], every: int = 1) -> dict[str, Any]:
+    """Return R, Q and the augmented filter's density for a sensor, with the multiples and inflated shares found.
+
+    Args:
+        scene: in which the clean measurements are simulated.
+        sensor: its errors.
+        motion: the largest unmodelled rates and accelerations.
+        every: only every so many-th step is measured. Q must cover (r T)^2 over the time T between measurements, so
+            each of the n steps takes n (r dt)^2; the density's unit is a^2 T.
+    """
     clean = dataclasses.replace(sensor, outlier_share=0.0, miss_share=0.0)
     measurement = (clean.bearing_noise**2, clean.distance_noise**2)
-    unit = ((motion["bearing_rad_s"] * DT) ** 2, (WALKING_SPEED * DT) ** 2)
-    process, multiples, shares = _smallest_multiples("akf", scene, clean, measurement, unit, (1e-4, 1e-4))
-    unit_cv = (motion["bearing_rad_s2"] ** 2 * DT, motion["distance_m_s2"] ** 2 * DT)
-    density, multiples_cv, shares_cv = _smallest_multiples("akf_cv", scene, clean, measurement, process, unit_cv)
+    unit = (every * (motion["bearing_rad_s"] * DT) ** 2, every * (WALKING_SPEED * DT) ** 2)
+    process, multiples, shares = _smallest_multiples("akf", scene, clean, measurement, unit, (1e-4, 1e-4), every)
+    unit_cv = (motion["bearing_rad_s2"] ** 2 * DT * every, motion["distance_m_s2"] ** 2 * DT * every)
+    density, multiples_cv, shares_cv = _smallest_multiples("akf_cv", scene, clean, measurement, process, unit_cv, every)
     return {
         "measurement": measurement,
         "process": process,
@@ -300,6 +315,7 @@ def _smallest_multiples(
     measurement: tuple[float, float],
     process: tuple[float, float],
     acceleration: tuple[float, float],
+    every: int,
 ) -> tuple[tuple[float, float], list[int], list[float]]:
     """Raise the multiple of the estimator's own noise per axis until it inflates fewer than 2 alpha of the steps."""
     env = FollowEnv(scene, sensor={"measurement": dataclasses.asdict(clean)})
@@ -308,30 +324,33 @@ def _smallest_multiples(
     while True:
         scaled = (multiples[0] * unit[0], multiples[1] * unit[1])
         noise = NoiseModel(measurement, *((scaled, acceleration) if estimator == "akf" else (process, scaled)))
-        shares = _inflated_shares(env, estimator, noise)
+        shares = _inflated_shares(env, estimator, noise, every)
         if max(shares) < 2.0 * ALPHA:
             env.close()
             return scaled, multiples, shares
         multiples = [m + (share >= 2.0 * ALPHA) for m, share in zip(multiples, shares, strict=True)]
 
 
-def _inflated_shares(env: FollowEnv, estimator: str, noise: NoiseModel) -> list[float]:
-    """Share of the steps in which the filter inflates a measurement, per axis, over the calibration episodes."""
+def _inflated_shares(env: FollowEnv, estimator: str, noise: NoiseModel, every: int = 1) -> list[float]:
+    """Share of the measured steps in which the filter inflates, per axis, over the calibration episodes."""
     policy = Follower(perceive_measurement, lambda: make_estimator(estimator, noise, ALPHA))
-    inflated, steps = [0, 0], 0
+    inflated, measured = [0, 0], 0
     for seed in range(FIRST_SEED, FIRST_SEED + RULE_EPISODES):
         observation, _ = env.reset(seed=seed)
-        state, ended = None, False
+        state, ended, step = None, False, 0
         while not ended:
+            if step % every:
+                observation[:3] = 0.0  # bearing, distance, validity
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", LockOutWarning)  # what is looked for here
                 action, state = policy.predict(observation, state)
-            steps += 1
+            measured += step % every == 0
+            step += 1
             for axis in (0, 1):
                 inflated[axis] += state.estimate is not None and state.estimate.action[axis] == "inflate"
             observation, _, terminated, truncated, _ = env.step(action)
             ended = terminated or truncated
-    return [count / steps for count in inflated]
+    return [count / measured for count in inflated]
 
 
 def _rounded(value: Any) -> Any:

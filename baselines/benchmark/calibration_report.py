@@ -22,6 +22,19 @@ def summary(calibration: dict[str, Any]) -> str:
     )
 
 
+def detector_summary(calibration: dict[str, Any]) -> str:
+    """Return the detector's measured errors and the noise of the filters behind it as two Markdown tables."""
+    first, last = calibration["how"]["seeds"]
+    return "\n\n".join(
+        (
+            f"Errors of the accepted measurements ({last - first} episodes a scene; missed: of the frames looked at):",
+            _frames(calibration),
+            "Filter noise by the rule (multiples of the unit in parentheses):",
+            _noise(calibration),
+        )
+    )
+
+
 def _frames(calibration: dict[str, Any]) -> str:
     header = ["scene", "depth rule", "missed", "angle RMSE (rad)", "angle bias", "distance RMSE (cm)", "bias", "spread"]
     header += ["outliers", "nearer", "farther", "outlier size (cm)", "mean run (s)"]

@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-PERCEPTIONS = ("truth", "emulated", "mask")
+PERCEPTIONS = ("truth", "emulated", "mask", "detector")
 """The rungs of Table 1, from best to real."""
 PIXELS = "pixels"
 """What a policy perceives that drives straight from the picture."""
 SCENES = ("corridor", "indoor")
 ESTIMATORS = ("none", "kf", "akf", "akf_cv")
 ENVIRONMENT_IDS = {"corridor": "follow_env/Corridor-v0", "indoor": "follow_env/Indoor-v0"}
-SENSORS = {"truth": "exact", "emulated": "fitted", "mask": "six_smallest", PIXELS: "xtion"}
+SENSORS = {
+    **{"truth": "exact", "emulated": "fitted", "mask": "six_smallest", "detector": "six_smallest"},
+    PIXELS: "xtion",
+}
 """The sensor at each perception unless told otherwise: for Table 1 the emulated one that is fitted to the paper's
-No filter row, and the rule by which depth is read from the rendered box."""
+No filter row, and the rule by which depth is read from the rendered or detected box."""
 DEPTH_RULES = ("six_smallest", "grid_mean", "centroid")
 """Rules of `tracker.sampling` that are compared on rendered frames."""
 
@@ -27,13 +30,15 @@ class Cell:
     """One combination of the benchmark's factors.
 
     Attributes:
-        perception: Where the measurement comes from: ``truth``, ``emulated`` or ``mask``; ``pixels`` has none.
+        perception: Where the measurement comes from: ``truth``, ``emulated``, ``mask`` or ``detector``; ``pixels`` has
+            none.
         scene: ``corridor`` or ``indoor``.
         estimator: ``none``, ``kf``, ``akf`` or ``akf_cv``.
         controller: ``pi``, ``parked``, ``random``, ``oracle`` or the name of a learned agent.
         q_scale: Multiple of the process noise that the rule for Q gives.
         alpha: Significance of the adaptive filter's outlier test.
-        sensor: Name of the emulated sensor, or the depth rule of ``mask``; empty takes that of ``SENSORS``.
+        sensor: Name of the emulated sensor, or the depth rule of ``mask`` and ``detector``; empty takes that of
+            ``SENSORS``.
     """
 
     perception: str

@@ -18,7 +18,7 @@ from baselines.benchmark import metrics
 from baselines.benchmark.cells import ENVIRONMENT_IDS, Cell, family_cells, rule_cells, sensitivity_cells, table1_cells
 from follow_env.config import CameraConfig, RobotConfig, SensorConfig
 
-EPISODES = {"truth": 100, "emulated": 100, "mask": 20}
+EPISODES = {"truth": 100, "emulated": 100, "mask": 20, "detector": 20}
 """Episodes per cell of Table 1 unless told otherwise, by perception: a rendered episode costs far more."""
 
 _STUDY_PART = {"sensitivity": 10, "family": 10, "rules": 2}
@@ -126,6 +126,7 @@ def _code_digest() -> str:
     files += [root / "baselines" / name for name in ("policy.py", "calibration.py", "floors.py")]
     files += [root / "baselines" / "learned" / name for name in ("agents.py", "networks.py")]
     files += [Path(__file__).with_name(name) for name in ("assembly.py", "cells.py", "episodes.py", "metrics.py")]
+    files.append(Path(__file__).with_name("tracking.py"))
     total = hashlib.sha256()
     for path in sorted(files):
         total.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())

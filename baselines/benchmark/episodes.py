@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.metrics import EpisodeMetrics, Row, quantile
+from baselines.benchmark.tracking import TrackingMetrics
+from baselines.policy import TrackingState
 from tracker.filters import LockOutWarning
 
 
@@ -39,7 +41,7 @@ class Episode:
     """One finished episode.
 
     Attributes:
-        row: Numbers by column name (``metrics.COLUMNS``).
+        row: Numbers by column name (``metrics.COLUMNS``, and ``tracking.COLUMNS`` of a follower that tracks).
         curve: Cumulative absolute errors, shape (steps, 3), float64: time s, angle rad, distance m.
         timing: Cost of the policy's step.
     """
@@ -65,7 +67,7 @@ def play(env: gym.Env, policy: Any, cell: Cell, seed: int) -> Episode:
         cell: Names the row.
         seed: Seed of the environment's reset.
     """
-    metrics = EpisodeMetrics(cell, seed)
+    metrics, tracking = EpisodeMetrics(cell, seed), TrackingMetrics()
     costs, stepping = [], 0.0
     state = None
     terminated = truncated = False
@@ -80,6 +82,8 @@ def play(env: gym.Env, policy: Any, cell: Cell, seed: int) -> Episode:
             action, state = policy.predict(observation, state, episode_start=start, deterministic=True)
             costs.append(time.perf_counter() - began)
             metrics.record(info, state.estimate, state.measurement)
+            if isinstance(state, TrackingState) and state.track is not None:
+                tracking.record(info, state.track)
             if terminated or truncated:
                 break
             began = time.perf_counter()
@@ -88,7 +92,7 @@ def play(env: gym.Env, policy: Any, cell: Cell, seed: int) -> Episode:
     total, deciding = time.perf_counter() - started, math.fsum(costs)
     steps = len(costs)
     timing = Timing(deciding / steps, quantile(costs, 0.95), stepping / steps, (total - deciding - stepping) / steps)
-    return Episode(row=metrics.row(terminated), curve=metrics.curve(), timing=timing)
+    return Episode(row=metrics.row(terminated) | tracking.columns(), curve=metrics.curve(), timing=timing)
 
 
 class Player:

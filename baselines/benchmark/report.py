@@ -14,6 +14,7 @@ _PERCEPTIONS = {
     "truth": "the measurement is the truth",
     "emulated": "truth through a measurement model, whose scale alone is fitted to the paper's No filter row",
     "mask": "rendered RGB-D, box of the visible pixels with stated jitter, real depth path; nothing is fitted",
+    "detector": "rendered RGB-D, boxes of the shipped detector, the tracker at 10 Hz; nothing is fitted",
 }
 NOTEWORTHY = 0.01
 """A difference below this share of No filter's RMSE is marked as slight, whatever its interval says."""
@@ -83,6 +84,15 @@ def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]], left: i
     return "\n".join([line(header), f"|{rule}|", *map(line, rows)])
 
 
+def difference_text(difference: Difference, quantity: str) -> str:
+    """A difference with its interval, if it has one, in the quantity's unit."""
+    text = number(difference.value, quantity, more=2)
+    if difference.interval is None:
+        return text
+    low, high = difference.interval
+    return f"{text} ({number(low, quantity, more=2)} to {number(high, quantity, more=2)})"
+
+
 def _errors(table: Table1, perception: str) -> str:
     header = ["scene", "quantity", "estimator", "RMSE", "95 % interval", "bias", "spread", "ratio"]
     header += ["paper", "paper ratio"]
@@ -122,7 +132,7 @@ def _hypotheses(table: Table1, perception: str) -> str:
                 none = table.error(perception, scene, "none", quantity)
                 slight = abs(difference.value) < NOTEWORTHY * none.rmse
                 row += [
-                    _difference(difference, quantity),
+                    difference_text(difference, quantity),
                     _VERDICT[difference.negative] + (" (slight)" if slight else ""),
                 ]
             outcomes = [difference.negative for difference in differences]
@@ -211,11 +221,3 @@ def _following(table: Table1, perception: str) -> str:
 
 def _ratio(value: float | None) -> str:
     return "–" if value is None else f"{value:.2f}"
-
-
-def _difference(difference: Difference, quantity: str) -> str:
-    text = number(difference.value, quantity, more=2)
-    if difference.interval is None:
-        return text
-    low, high = difference.interval
-    return f"{text} ({number(low, quantity, more=2)} to {number(high, quantity, more=2)})"

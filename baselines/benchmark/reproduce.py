@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from baselines.benchmark import configuration, figures, metrics
+from baselines.benchmark import configuration, figures, metrics, tracking
 from baselines.benchmark.configuration import Plan
 from baselines.benchmark.curves import CURVE_COLUMNS, curve_records
+from baselines.benchmark.detector_report import COST_COLUMNS, cost_records, detector_report
 from baselines.benchmark.episodes import EpisodeFunction
 from baselines.benchmark.files import write_csv, write_text
 from baselines.benchmark.report import report
@@ -28,7 +29,8 @@ def reproduce(
 
     Args:
         plan: Cells and seeds.
-        calibration: Content of the calibration, part of the configuration's hash.
+        calibration: Content of the calibration, and what identifies the detector if one is used, part of the
+            configuration's hash.
         episode: Plays one cell and seed; picklable when several jobs are used.
         out: Results folder; made when missing.
         jobs: Number of processes. The results do not depend on it.
@@ -65,7 +67,13 @@ def _write(plan: Plan, episodes: Store, out: Path) -> tuple[str, Played]:
             rules = records
     measured = Table1({cell: [played.row for played in group] for cell, group in table.items()})
     write_csv(out / "table1.csv", COLUMNS, measured.records(), _DIGITS)
-    text = report(measured, rules)
+    tracked = [row for cell, group in measured.rows.items() if cell.perception == "detector" for row in group]
+    if tracked:
+        write_csv(out / "tracking_episodes.csv", tracking.COLUMNS, tracked)
+    costs = cost_records(measured)
+    if costs:
+        write_csv(out / "detector_cost.csv", COST_COLUMNS, costs, _DIGITS)
+    text = "\n".join(filter(None, (report(measured, rules), detector_report(measured))))
     pictures = "\n\n".join(f"![{path.stem.replace('_', ' ')}]({FIGURES}/{path.name})" for path in drawn)
     write_text(out / "table1.md", f"{text}\n## Figures\n\n{pictures}\n")
     return text, table

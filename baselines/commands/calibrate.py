@@ -4,32 +4,51 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from baselines.commands.arguments import Commands, add_jobs, output_file
-from baselines.commands.exits import CommandError
+from baselines.commands.exits import CommandError, detecting
+
+SHIPPED = Path(__file__).parents[1]
+"""Folder of the shipped calibrations."""
 
 
 def add(commands: Commands) -> None:
     """Add the command to ``follow``."""
     calibrate = commands.add_parser("calibrate", help="measure the sensor's shape and fit its scale again")
-    shipped = Path(__file__).parents[1] / "calibration.json"
+    calibrate.add_argument("--out", type=output_file, metavar="FILE", help="default: the shipped file")
+    calibrate.add_argument("--detector", action="store_true", help="measure the detector's noise instead")
     calibrate.add_argument(
-        "--out",
-        type=output_file,
-        default=str(shipped),
-        metavar="FILE",
-        help="default: the shipped file",
+        "--weights", type=Path, metavar="FILE", help="with --detector: of the light net (default: the shipped ones)"
     )
     add_jobs(calibrate)
     calibrate.set_defaults(run=_run)
 
 
 def _run(parsed: argparse.Namespace) -> None:
-    from baselines.benchmark import calibrate, calibration_report
+    from baselines.benchmark import calibration_report
 
+    out = parsed.out or SHIPPED / ("calibration_detector.json" if parsed.detector else "calibration.json")
+    if parsed.weights is not None and not parsed.detector:
+        raise CommandError("--weights are those of a detector; say --detector as well")
     try:
-        content = calibrate.main(parsed.out, parsed.jobs)
+        if parsed.detector:
+            text = calibration_report.detector_summary(_measure_detector(parsed.weights, out, parsed.jobs))
+        else:
+            from baselines.benchmark import calibrate
+
+            text = calibration_report.summary(calibrate.main(out, parsed.jobs))
     except OSError as error:
-        raise CommandError(f"{parsed.out} cannot be written ({error.strerror}); name another with --out") from error
-    print(calibration_report.summary(content))
-    print(f"\nThe calibration is {parsed.out}.")
+        raise CommandError(f"{out} cannot be written ({error.strerror}); name another with --out") from error
+    print(text)
+    print(f"\nThe calibration is {out}.")
+
+
+def _measure_detector(weights: Path | None, out: Path, jobs: int) -> dict[str, Any]:
+    with detecting():
+        from baselines.benchmark import calibrate_detector
+        from tracker.detection.detector import PersonDetector, shipped_weights
+
+        weights = weights or shipped_weights()
+        PersonDetector(weights=weights)  # says what is wrong with a file before any work is done
+        return calibrate_detector.main(weights, out, jobs)

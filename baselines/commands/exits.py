@@ -36,6 +36,17 @@ def bad_input(*kinds: type[Exception]) -> Iterator[None]:
 
 
 @contextmanager
+def detecting() -> Iterator[None]:
+    """Let a detector that cannot be had end the command: PyTorch, its weights or their calibration are missing."""
+    try:
+        with bad_input(FileNotFoundError, ValueError):
+            yield
+    except ModuleNotFoundError as error:
+        sentence = f"the detector needs {error.name}; install it with pip install 'follow-env[learn]'"
+        raise CommandError(sentence) from error
+
+
+@contextmanager
 def playing(out: Path) -> Iterator[Player]:
     """Lend a player for a run that keeps its episodes in ``out``; an episode that breaks ends the command."""
     from baselines.benchmark.episodes import Player

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from baselines.benchmark.cells import PERCEPTIONS
 from baselines.commands.arguments import Commands, add_jobs, positive
-from baselines.commands.exits import bad_input, playing
+from baselines.commands.exits import bad_input, detecting, playing
 
 
 def add(commands: Commands) -> None:
@@ -41,13 +41,17 @@ def add(commands: Commands) -> None:
 
 def _run(parsed: argparse.Namespace) -> None:
     from baselines import calibration
+    from baselines.benchmark.assembly import detector_identity
     from baselines.benchmark.configuration import Plan
     from baselines.benchmark.reproduce import reproduce
-    from baselines.benchmark.store import InputError
 
     out = parsed.out or Path("results", "reproduced" if parsed.episodes is None else f"reproduced-{parsed.episodes}")
     plan = Plan.of(parsed.perception or ["emulated", "mask"], parsed.episodes, list(calibration.family()))
-    with playing(out) as player, bad_input(InputError):
-        text = reproduce(plan, calibration.settings(), player, out, parsed.jobs, parsed.resume)
+    settings = dict(calibration.settings())
+    if "detector" in plan.episodes:
+        with detecting():
+            settings["detector"] = detector_identity()
+    with playing(out) as player, bad_input(ValueError):
+        text = reproduce(plan, settings, player, out, parsed.jobs, parsed.resume)
     print(text)
     print(f"Tables, raw episodes and figures are in {out}.")

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from baselines.commands.arguments import Commands
-from baselines.commands.exits import CommandError, bad_input
+from baselines.commands.exits import bad_input, detecting
 
 
 def add(commands: Commands) -> None:
@@ -37,18 +37,13 @@ def _run(parsed: argparse.Namespace) -> None:
     from baselines.track import track
     from tracker.recording import Recording
 
-    try:
-        with bad_input(ValueError, OSError):
-            recording = Recording.open(parsed.source)
-            from tracker.detection.detector import PersonDetector
+    with detecting(), bad_input(OSError):
+        recording = Recording.open(parsed.source)
+        from tracker.detection.detector import PersonDetector
 
-            detector = PersonDetector(parsed.net, parsed.weights)
-            out = parsed.out or Path("results", f"track-{parsed.source.resolve().name}")
-            print(track(recording, out, detector, parsed.target, functools.partial(print, file=sys.stderr)))
-    except ModuleNotFoundError as error:
-        raise CommandError(
-            f"the detector needs {error.name}; install it with pip install 'follow-env[learn]'"
-        ) from error
+        detector = PersonDetector(parsed.net, parsed.weights)
+        out = parsed.out or Path("results", f"track-{parsed.source.resolve().name}")
+        print(track(recording, out, detector, parsed.target, functools.partial(print, file=sys.stderr)))
 
 
 def _pixel(text: str) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from baselines.benchmark.cells import ESTIMATORS, PERCEPTIONS, SCENES, Cell
 from baselines.commands.arguments import Commands, add_seed, natural, output_file
-from baselines.commands.exits import bad_input
+from baselines.commands.exits import detecting
 
 
 def add(commands: Commands) -> None:
@@ -31,7 +31,7 @@ def add(commands: Commands) -> None:
 def _run(parsed: argparse.Namespace) -> None:
     from baselines.watch import watch
 
-    with bad_input(ValueError):
+    with detecting():
         cell = Cell(parsed.perception, parsed.scene, parsed.estimator)
         renderer, size, shadows = parsed.renderer, parsed.size, parsed.shadows
         print(watch(cell, parsed.seed, parsed.video, renderer=renderer, size=size, shadows=shadows))

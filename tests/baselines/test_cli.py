@@ -63,7 +63,7 @@ def test_help_imports_nothing_heavy(arguments: list[str], tmp_path: Path) -> Non
         ([*TABLE1, "--jobs", "0"], "--jobs: '0' is not a whole number of at least 1"),
         (
             [*TABLE1, "--perception", "maks"],
-            "--perception: invalid choice: 'maks' (choose from 'truth', 'emulated', 'mask')",
+            "--perception: invalid choice: 'maks' (choose from 'truth', 'emulated', 'mask', 'detector')",
         ),
         ([*TABLE1, "--quick"], "unrecognized arguments: --quick"),
         (["watch", "--scene", "garden"], "--scene: invalid choice: 'garden'"),

@@ -16,6 +16,9 @@ CONFIDENCE = 0.5
 """Least score of an effective output (paper A, section 3.2)."""
 OVERLAP = 0.45
 """Greatest overlap of two people that are both reported (SSD)."""
+GRID = 0.25
+"""Boxes are rounded to this, px: far below their error and far above the last bits of a convolution (1e-5 px), in which
+processors differ. In a closed loop such bits would come back larger."""
 SHIPPED = Path(__file__).parent / "assets"
 """Weights that come with the package."""
 
@@ -36,12 +39,7 @@ class PersonDetector:
     def __init__(self, net: str = "light", weights: Path | None = None, threads: int = 1) -> None:
         choose("net", net, NETS)
         if weights is None:
-            weights = SHIPPED / f"{net}.safetensors"
-            if not weights.is_file():
-                raise FileNotFoundError(
-                    f"no weights are shipped for the net {net!r}; "
-                    f"make some with `follow detector train --net {net}` and name the file"
-                )
+            weights = shipped_weights(net)
         torch.set_num_threads(threads)
         self.network = load_network(net, weights)
         self._priors = prior_boxes(self.network.config.layers)
@@ -50,6 +48,8 @@ class PersonDetector:
         self, rgb: np.ndarray, depth: np.ndarray | None = None, confidence: float = CONFIDENCE
     ) -> list[Detection]:
         """Return the people in a picture, the most certain first; boxes in px of that picture, cut at its edge.
+
+        Boxes are rounded to `GRID`.
 
         Args:
             rgb: (H, W, 3) uint8.
@@ -60,7 +60,18 @@ class PersonDetector:
         picture = network_input(rgb, depth if self.network.config.depth else None)
         logits, offsets = predict(self.network, picture[None])
         height, width = rgb.shape[:2]
-        return read(logits[0], offsets[0], self._priors, (width, height), confidence)
+        return read(logits[0], offsets[0], self._priors, (width, height), confidence, GRID)
+
+
+def shipped_weights(net: str = "light") -> Path:
+    """Return the file of the weights that come with the package; raise FileNotFoundError if there are none."""
+    weights = SHIPPED / f"{net}.safetensors"
+    if not weights.is_file():
+        raise FileNotFoundError(
+            f"no weights are shipped for the net {net!r}; "
+            f"make some with `follow detector train --net {net}` and name the file"
+        )
+    return weights
 
 
 def network_input(rgb: np.ndarray, depth: np.ndarray | None) -> np.ndarray:
@@ -92,13 +103,23 @@ def predict(network: MultiBoxNet, pictures: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def read(
-    logits: np.ndarray, offsets: np.ndarray, priors: np.ndarray, size: tuple[int, int], confidence: float
+    logits: np.ndarray,
+    offsets: np.ndarray,
+    priors: np.ndarray,
+    size: tuple[int, int],
+    confidence: float,
+    grid: float = 0.0,
 ) -> list[Detection]:
-    """Return the detections of one picture of `size` (width, height) px from its logits (P, 2) and offsets (P, 4)."""
+    """Return the detections of one picture of `size` (width, height) px from its logits (P, 2) and offsets (P, 4).
+
+    Boxes are rounded to multiples of `grid` px, unless that is 0.
+    """
     scores = 1.0 / (1.0 + np.exp(logits[:, 0] - logits[:, 1]))
     likely = np.flatnonzero(scores >= confidence)
     width, height = size
     boxes = np.clip(decode(offsets[likely], priors[likely]), 0.0, 1.0) * (width, height, width, height)
+    if grid:
+        boxes = grid * np.round(boxes / grid)
     scores = scores[likely]
     return [Detection(tuple(boxes[k].tolist()), float(scores[k])) for k in nms(boxes, scores, OVERLAP)]
 

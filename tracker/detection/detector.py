@@ -35,15 +35,8 @@ class PersonDetector:
 
     def __init__(self, net: str = "light", weights: Path | None = None, threads: int = 1) -> None:
         choose("net", net, NETS)
-        if weights is None:
-            weights = SHIPPED / f"{net}.safetensors"
-            if not weights.is_file():
-                raise FileNotFoundError(
-                    f"no weights are shipped for the net {net!r}; "
-                    f"make some with `follow detector train --net {net}` and name the file"
-                )
         torch.set_num_threads(threads)
-        self.network = load_network(net, weights)
+        self.network = load_network(net, weights or shipped_weights(net))
         self._priors = prior_boxes(self.network.config.layers)
 
     def detect(
@@ -61,6 +54,17 @@ class PersonDetector:
         logits, offsets = predict(self.network, picture[None])
         height, width = rgb.shape[:2]
         return read(logits[0], offsets[0], self._priors, (width, height), confidence)
+
+
+def shipped_weights(net: str) -> Path:
+    """Return the file of the weights that come with the package; a FileNotFoundError if there is none for this net."""
+    weights = SHIPPED / f"{net}.safetensors"
+    if not weights.is_file():
+        raise FileNotFoundError(
+            f"no weights are shipped for the net {net!r}; "
+            f"make some with `follow detector train --net {net}` and name the file"
+        )
+    return weights
 
 
 def network_input(rgb: np.ndarray, depth: np.ndarray | None) -> np.ndarray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from baselines.astronaut import lookalike, rectangle, table2
-from baselines.astronaut.nets import OURS
+from baselines.astronaut.table2 import OURS
 from baselines.benchmark.files import Value
 from follow_env.person.walker import POSTURES
 from tracker.detection.sequences import Sequence as Film

@@ -1,4 +1,4 @@
-"""The two detectors that paper A compares: its own with shared features, and the SSD it started from."""
+"""The two detectors that paper A compares, with their weights; apart from the experiments because it brings torch."""
 
 from __future__ import annotations
 
@@ -6,12 +6,9 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from baselines.astronaut.table2 import NETS
 from follow_env.config import choose
 from tracker.detection.detector import PersonDetector, shipped_weights
-
-OURS, SSD = "light", "light_ssd"
-NETS = (SSD, OURS)
-"""Both on the light trunk, in the paper's order: 8732 priors without shared features, 2252 with them."""
 
 
 class Nets(Mapping[str, PersonDetector]):

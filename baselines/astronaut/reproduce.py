@@ -10,7 +10,7 @@ from typing import Any
 
 from baselines.astronaut import lookalike, rectangle, stage, table2
 from baselines.astronaut.experiments import EPISODES, EXPERIMENTS, Detectors, Part, Player, Rows, tasks
-from baselines.astronaut.nets import OURS, SSD
+from baselines.astronaut.table2 import OURS, SSD
 from baselines.benchmark import configuration
 from baselines.benchmark.files import write_csv, write_text
 from baselines.benchmark.running import complete

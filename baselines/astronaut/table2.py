@@ -11,7 +11,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from baselines.astronaut.nets import NETS, OURS, SSD
 from baselines.benchmark.files import Value
 from baselines.benchmark.report import markdown_table
 from follow_env.person.walker import POSTURES
@@ -22,6 +21,11 @@ from tracker.person_tracker import Detector
 from tracker.sampling import Box
 
 Row = Mapping[str, Value]
+
+OURS, SSD = "light", "light_ssd"
+NETS = (SSD, OURS)
+"""The nets compared, in the paper's order, both on the light trunk: SSD's 8732 priors without shared features, and the
+paper's 2252 with them."""
 
 PAPER: dict[tuple[str, int], dict[str, DetectionCounts]] = {
     ("green", 1): {SSD: DetectionCounts(1850, 1844, 0, 6, 4), OURS: DetectionCounts(1850, 1850, 0, 0, 0)},

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from baselines.astronaut.nets import NETS, OURS, SSD
+from baselines.astronaut.table2 import NETS, OURS, SSD
 from baselines.benchmark.files import Value, write_csv, write_text
 from baselines.benchmark.report import markdown_table
 from baselines.speed.timing import Cost, measure
@@ -131,8 +131,8 @@ def table(speeds: Sequence[Speed]) -> str:
         )
     return (
         "# Table 3, measured here\n\n"
-        f"One thread, pictures of 320 x 240 px that are rendered before; `{SSD}` and `{OURS}` share a light trunk, "
-        f"`{FULL[SSD]}` and `{FULL[OURS]}` have the paper's. The trackers process every frame.\n\n"
+        f"One thread, pictures of 320 x 240 px that are rendered before. `{SSD}` and `{OURS}` have the same light "
+        f"trunk,\n`{FULL[SSD]}` and `{FULL[OURS]}` the paper's. The trackers process every frame.\n\n"
         f"{markdown_table(header, lines, left=2)}\n\n"
         "The paper's: SSD 60 and theirs 66 frames/s on a Titan X (1.10 x), 10 to 11 and 11 to 12 on a Jetson TX2."
     )

@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from follow_env.camera import CameraPose, PinholeCamera, RGBDFrame
 from follow_env.camera.raster import RasterRenderer
 from follow_env.config import CameraConfig
-from follow_env.person.bodies import Colour, Outfit, load_body
+from follow_env.person.bodies import SUITS, Outfit, load_body
 from follow_env.person.walker import POSTURES, Walker
 from follow_env.scenes import make_scene
 from tracker.detection.detector import PersonDetector
 from tracker.metrics import DetectionCounts, count_detections
 
-SUITS: dict[str, Colour] = {"green": (0.16, 0.48, 0.28), "blue": (0.13, 0.33, 0.70), "indigo": (0.18, 0.16, 0.42)}
-"""Colours of the suits, sRGB: three spacesuits, as the paper has it."""
 VIEWS = (CameraPose(4.2, 0.0, 1.0, 0.0), CameraPose(9.3, 1.1, 1.45, math.atan2(-1.0, -2.6)))
 """Two directions of view on the subject."""
 SUBJECT = (6.7, 0.1)

@@ -1,0 +1,1 @@
+"""Paper A's two tracking experiments, made again in the cabin."""

@@ -163,7 +163,9 @@ def draw(rows: Sequence[Mapping[str, Value]], path: Path) -> None:
             _draw_plan(plan, walk)
             _draw_depth(depth, walk)
             title = str(walk[0]["posture"]).replace("_", " ")
-            plan.set_title(title if walk[0]["run"] == "all" else f"{title}, {GAP_FRAMES} detections removed twice", loc="left")
+            plan.set_title(
+                title if walk[0]["run"] == "all" else f"{title}, {GAP_FRAMES} detections removed twice", loc="left"
+            )
         panels[-1][0].set_xlabel("to the right of the camera (m)")
         panels[-1][1].set_xlabel("time (s)")
         handles, labels = panels[-1][1].get_legend_handles_labels()
@@ -345,7 +347,11 @@ def _draw_depth(axes: Axes, walk: Sequence[Mapping[str, Value]]) -> None:
     lines = (
         ("truth", "reference path", {"color": _BLACK, "linewidth": 1.2}),
         ("measured", "measured", {"color": _GREEN, "marker": "o", "linestyle": "none", "markersize": 2.5}),
-        ("estimated", "estimated or predicted", {"color": _VERMILION, "marker": "x", "linestyle": "none", "markersize": 2.5}),
+        (
+            "estimated",
+            "estimated or predicted",
+            {"color": _VERMILION, "marker": "x", "linestyle": "none", "markersize": 2.5},
+        ),
     )
     for name, label, style in lines:
         known = [row for row in walk if row[f"{name}_x"] is not None]

@@ -67,7 +67,8 @@ class TrackerSettings:
         measurement_noise: Of the filter, m².
 
     Raises:
-        ValueError: If a number is not positive and finite, `every` is not a whole number or `depth` or `frame` not known.
+        ValueError: If a number is not positive and finite, `every` is not a whole number, or `depth` or `frame` is not
+            known.
     """
 
     rate: float = 30.0

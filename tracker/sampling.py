@@ -107,9 +107,7 @@ def _hides(depth: NDArray[np.float32], one: Box, other: Box, valid_range: tuple[
     return whole > own - IN_FRONT if own is not None else whole <= others_own - IN_FRONT  # type: ignore[operator]
 
 
-def _front(
-    depth: NDArray[np.float32], box: Box, less: Box | None, valid_range: tuple[float, float]
-) -> float | None:
+def _front(depth: NDArray[np.float32], box: Box, less: Box | None, valid_range: tuple[float, float]) -> float | None:
     """Return the mean of the six smallest of many samples of a box, outside another; None if there are too few."""
     visible = _clipped(box, depth.shape[1], depth.shape[0])
     if visible is None:

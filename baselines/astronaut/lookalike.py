@@ -11,9 +11,12 @@ An episode, drawn from its seed and from nothing else:
 **Right and wrong.** In a frame with an accepted measurement the tracker is wrong if its box overlaps the other person's
 true box more than the target's, and at nobody's if it overlaps neither. A switch is a wrong frame after a right one.
 
-**Hidden.** The target is visible while at least half of its pixels are; the occlusion starts with
-the first processed frame from which it stays hidden for longer than a second. A stop while it is visible is a false one;
-if the target is nearly whole then, a person names it again, as the paper's alarm asks for.
+**Hidden.** The target is visible while at least half of its pixels are; the occlusion starts with the first processed
+frame from which it stays hidden for longer than a second. A stop while it is visible is a false one; if the target is
+nearly whole then, a person names it again, as the paper's alarm asks for.
+
+**Two trackers** see the same detections: ours, and the paper's to the letter, which reads the depth of whoever steps
+before the target out of the target's box, follows that depth inside the gate, and so adopts the other person.
 """
 
 from __future__ import annotations
@@ -23,20 +26,24 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.random import Generator
 from scipy.stats import binomtest
 
-from baselines.astronaut.stage import CAMERA, PERIOD, SETTINGS, Picture, Watch, stage
-from baselines.benchmark.files import Value
+from baselines.astronaut.stage import CAMERA, PERIOD, PRINTED, SETTINGS, Picture, Watch, stage
 from baselines.benchmark.figures import picture
+from baselines.benchmark.files import Value
 from follow_env.camera.mesh import Placed
 from follow_env.person.bodies import BODIES, SUITS, Outfit, load_body
 from follow_env.person.walker import Walker
 from tracker.detection.boxes import Detection
 from tracker.metrics import overlap
 from tracker.person_tracker import Detector, Track
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Row = dict[str, Value]
 
@@ -51,20 +58,33 @@ HIDDEN_TIME = SETTINGS.stop_time
 """For longer than this the target must stay hidden for an occlusion, s."""
 WHOLE = 0.75
 """Least visible share of the target at which it is named again after a false stop."""
-PAPER_STOP = 1.0
-"""The paper's time to stop, s: from the 291st to the 321st frame at 30 frames/s."""
+
+FILMED = 11
+"""Seed of the episode that is drawn."""
 
 COLUMNS = (
     *("perception", "seed", "suit", "body", "posture", "distance", "gap", "passes_behind", "step_in"),
     *("frames", "confirmed_time", "tracked_frames", "wrong_frames", "nobody_frames", "switches", "switches_hidden"),
     *("gate_rejections", "least_visible", "step_in_time", "occlusion_start", "stop_time"),
     *("false_stops", "seconds_visible"),
+    *(
+        "printed_wrong_frames",
+        "printed_switches",
+        "printed_switches_hidden",
+        "printed_stop_time",
+        "printed_false_stops",
+    ),
 )
 """Of a row. `distance` of the target, `gap` between the two when close and `step_in`, how far before the target the
 other one stays, m; frames are processed ones; `switches_hidden` of the switches began when the target was hidden;
 `gate_rejections` are frames with detections, none of which was inside the gate; `least_visible` is the smallest visible
 share before the other one steps in; times in s, empty if there is none; `stop_time` counts from the occlusion's start;
-`seconds_visible` from the first confirmation on."""
+`seconds_visible` from the first confirmation on. `printed_...` are those of the paper's tracker to the letter, which
+takes its depth samples from the box whosoever they are."""
+
+
+_TRACKERS = {"ours": "", "printed": "printed_"}
+_GREEN, _VERMILION = "#009E73", "#D55E00"
 
 
 @dataclass(frozen=True)
@@ -121,19 +141,20 @@ class Frame:
         shown: The picture and its truth.
         found: What was detected.
         track: What the tracker knows then.
+        printed: What the paper's tracker to the letter knows of the same detections.
     """
 
     time: float
     shown: Picture
     found: Sequence[Detection]
     track: Track
+    printed: Track
 
-    @property
-    def followed(self) -> str | None:
-        """Whose box was accepted: `target`, `other` or `nobody`; None without a measurement."""
-        if self.track.measurement is None or self.track.box is None:
+    def followed(self, track: Track) -> str | None:
+        """Return whose box a tracker accepted: `target`, `other` or `nobody`; None without a measurement."""
+        if track.measurement is None or track.box is None:
             return None
-        shares = {id: overlap(self.track.box, box) for id, box in self.shown.boxes.items()}
+        shares = {id: overlap(track.box, box) for id, box in self.shown.boxes.items()}
         target, other = shares.get(TARGET, 0.0), shares.get(OTHER, 0.0)
         return "nobody" if target == other == 0.0 else "other" if other > target else "target"
 
@@ -152,8 +173,62 @@ def play(seed: int, detector: Detector | None = None) -> Row:
     row: Row = {"perception": "mask" if detector is None else "detector", "seed": seed}
     row |= {name: getattr(script, name) for name in ("suit", "body", "posture", "distance", "gap", "step_in")}
     row |= {"passes_behind": int(script.passes_behind)}
-    row |= _judge([_Moment.of(frame) for frame in film(seed, detector)], script.keys[-3][0])
+    ours, printed = [], []
+    for frame in film(seed, detector):
+        ours.append(_Moment.of(frame, frame.track))
+        printed.append(_Moment.of(frame, frame.printed))
+    step_in_time = script.keys[-3][0]
+    row |= _judge(ours, step_in_time)
+    row |= {f"printed_{name}": value for name, value in _judge(printed, step_in_time).items()}
     return {name: row[name] for name in COLUMNS}
+
+
+def table(rows: Sequence[Mapping[str, Value]]) -> str:
+    """Return a markdown table of totals: a row for the tracker and one for the printed one, for each source of boxes.
+
+    Args:
+        rows: Of any number of episodes.
+    """
+    lines = [
+        "| boxes | tracker | episodes | with the wrong person (95 % interval) | switches before / after hidden "
+        "| wrong frames | hidden | stopped, nobody wrong | time to stop, median / p95 (paper 1.0) | false stops per minute |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for perception in dict.fromkeys(row["perception"] for row in rows):
+        chosen = [row for row in rows if row["perception"] == perception]
+        lines += [_table_line(str(perception), name, prefix, chosen) for name, prefix in _TRACKERS.items()]
+    lines += [
+        "",
+        "`ours` takes no depth sample of somebody nearer, `printed` is the paper's to the letter. A switch is a frame "
+        "in which another person's box is accepted after one in which the target's was. The target is hidden when "
+        f"less than {100 * HALF:.0f} % of its pixels are visible for longer than {HIDDEN_TIME:g} s; times count from "
+        "then, in s. Exact (Clopper-Pearson) intervals. Share stopped: of the episodes in which the target was hidden.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def draw(detector: Detector | None, path: Path) -> None:
+    """Draw two film strips, the close pass (Figure 17) and the occlusion (Figure 18), with boxes, states and times.
+
+    Args:
+        detector: As in `play`.
+        path: The picture; its folder exists.
+    """
+    script = draw_script(FILMED)
+    arrival, leaving, stepping, stepped = (script.keys[k][0] for k in (2, 3, -3, -2))
+    behind = 0.5 * (leaving + script.keys[-4][0])
+    strips = (
+        (0.5 * arrival + 0.5 * script.keys[1][0], arrival, leaving, behind, stepping),
+        (stepping + 0.4 * (stepped - stepping), *(stepped - 0.4 + 0.6 * k for k in range(4))),
+    )
+    wanted = {round(time / PERIOD): place for place, time in _places(strips)}
+    with picture(path, width=12.0, height=4.6) as figure:
+        panels = figure.subplots(len(strips), len(strips[0]))
+        for number, frame in enumerate(film(FILMED, detector)):
+            if number in wanted:
+                _draw_frame(panels[wanted[number]], frame)
+        panels[0][0].set_ylabel("close pass")
+        panels[1][0].set_ylabel("occlusion")
 
 
 def film(seed: int, detector: Detector | None = None) -> Iterator[Frame]:
@@ -164,7 +239,7 @@ def film(seed: int, detector: Detector | None = None) -> Iterator[Frame]:
     target = _Mover(Walker(body, TARGET), script.posture, script.heading)
     other = _Mover(Walker(body, OTHER), "walk", script.heading)
     noise = np.random.default_rng((1, seed))
-    watch, lost = Watch(), False
+    watches = (Watch(), Watch(PRINTED))
     for frame in range(int(script.keys[-1][0] / PERIOD) + 1):
         time = frame * PERIOD
         people = [target.go(script.target(time), turns=False)]
@@ -172,11 +247,11 @@ def film(seed: int, detector: Detector | None = None) -> Iterator[Frame]:
             people.append(other.go(script.other(time)))
         shown = stage().take(people, int(noise.integers(1 << 63)))
         found = shown.perfect_detections() if detector is None else detector.detect(shown.rgb, shown.depth)
-        track = watch.see(shown, found)
-        yield Frame(time, shown, found, track)
-        lost = track.alarm
-        if lost and shown.shares[TARGET] >= WHOLE:
-            watch.tracker.confirm(shown.boxes[TARGET])
+        tracks = [watch.see(shown, found) for watch in watches]
+        yield Frame(time, shown, found, *tracks)
+        for watch, track in zip(watches, tracks, strict=True):
+            if track.alarm and shown.shares[TARGET] >= WHOLE:
+                watch.tracker.confirm(shown.boxes[TARGET])
 
 
 def draw_script(seed: int) -> Script:
@@ -216,6 +291,59 @@ def draw_script(seed: int) -> Script:
         step_in=step_in,
         keys=tuple(keys),
     )
+
+
+def _table_line(perception: str, name: str, prefix: str, rows: Sequence[Mapping[str, Value]]) -> str:
+    def numbers(column: str) -> list[float]:
+        return [float(str(row[column])) for row in rows if row[column] is not None]
+
+    switches, wrong = numbers(f"{prefix}switches"), numbers(f"{prefix}wrong_frames")
+    hidden_switches = sum(numbers(f"{prefix}switches_hidden"))
+    switched = sum(count > 0.0 for count in wrong)
+    low, high = binomtest(switched, len(rows)).proportion_ci(0.95, "exact")
+    hidden = [row for row in rows if row["occlusion_start"] is not None]
+    stopped = sum(row[f"{prefix}stop_time"] is not None and row[f"{prefix}wrong_frames"] == 0 for row in hidden)
+    times = sorted(numbers(f"{prefix}stop_time"))
+    median, late = (f"{np.quantile(times, q):.2f}" for q in (0.5, 0.95)) if times else ("", "")
+    minutes = sum(numbers("seconds_visible")) / 60.0
+    cells = (
+        perception,
+        name,
+        len(rows),
+        f"{switched} ({100 * low:.1f}-{100 * high:.1f} %)",
+        f"{sum(switches) - hidden_switches:.0f} / {hidden_switches:.0f}",
+        f"{sum(wrong):.0f}",
+        len(hidden),
+        f"{stopped} ({100 * stopped / len(hidden):.1f} %)" if hidden else "",
+        f"{median} / {late}",
+        f"{sum(numbers(f'{prefix}false_stops')) / minutes:.2f}" if minutes else "",
+    )
+    return "| " + " | ".join(map(str, cells)) + " |"
+
+
+def _places(strips: Sequence[Sequence[float]]) -> Iterator[tuple[tuple[int, int], float]]:
+    for row, times in enumerate(strips):
+        for column, time in enumerate(times):
+            yield (row, column), time
+
+
+def _draw_frame(axes: Axes, frame: Frame) -> None:
+    """Show a picture: the tracked box green, other detections red, as in the paper; a tracked one is drawn broader."""
+    from matplotlib.patches import Rectangle
+
+    tracked = frame.track.box if frame.track.measurement is not None else None
+    axes.imshow(frame.shown.rgb)
+    for detection in frame.found:
+        u0, v0, u1, v1 = detection.box
+        is_target = tracked is not None and overlap(detection.box, tracked) > 0.99
+        colour, width = (_GREEN, 2.4) if is_target else (_VERMILION, 1.2)
+        axes.add_patch(Rectangle((u0, v0), u1 - u0, v1 - v0, edgecolor=colour, facecolor="none", linewidth=width))
+    axes.set_xlim(0, frame.shown.rgb.shape[1])
+    axes.set_ylim(frame.shown.rgb.shape[0], 0)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.grid(visible=False)
+    axes.set_title(f"{frame.time:.1f} s: {frame.track.state}", fontsize=9)
 
 
 def _between(rng: Generator, low: float, high: float) -> float:
@@ -283,11 +411,10 @@ class _Moment:
     rejected: bool
 
     @classmethod
-    def of(cls, frame: Frame) -> _Moment:
-        track = frame.track
+    def of(cls, frame: Frame, track: Track) -> _Moment:
         rejected = track.measurement is None and track.gate_distance is not None and track.state in ("coasting", "lost")
         share = frame.shown.shares[TARGET]
-        return cls(frame.time, share, track.state, track.confirmations > 0, frame.followed, rejected)
+        return cls(frame.time, share, track.state, track.confirmations > 0, frame.followed(track), rejected)
 
     @property
     def visible(self) -> bool:

@@ -32,8 +32,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from baselines.astronaut.stage import CAMERA, PERIOD, SETTINGS, Picture, Watch, stage
-from baselines.benchmark.files import Value
 from baselines.benchmark.figures import picture
+from baselines.benchmark.files import Value
 from follow_env.config import choose
 from follow_env.person.bodies import SUITS, Outfit, load_body
 from follow_env.person.walker import Walker
@@ -163,7 +163,9 @@ def draw(rows: Sequence[Mapping[str, Value]], path: Path) -> None:
             _draw_plan(plan, walk)
             _draw_depth(depth, walk)
             title = str(walk[0]["posture"]).replace("_", " ")
-            plan.set_title(title if walk[0]["run"] == "all" else f"{title}, {GAP_FRAMES} detections removed twice", loc="left")
+            plan.set_title(
+                title if walk[0]["run"] == "all" else f"{title}, {GAP_FRAMES} detections removed twice", loc="left"
+            )
         panels[-1][0].set_xlabel("to the right of the camera (m)")
         panels[-1][1].set_xlabel("time (s)")
         handles, labels = panels[-1][1].get_legend_handles_labels()
@@ -343,12 +345,14 @@ def _draw_depth(axes: Axes, walk: Sequence[Mapping[str, Value]]) -> None:
         times = [float(str(row["time"])) for row in walk if row["gap"] == name]
         axes.axvspan(times[0] - 0.5 * PERIOD, times[-1] + 0.5 * PERIOD, color=_GREY, alpha=0.5, linewidth=0.0)
     lines = (
-        ("truth", "reference path", {"color": _BLACK, "linewidth": 1.2}),
-        ("measured", "measured", {"color": _GREEN, "marker": "o", "linestyle": "none", "markersize": 2.5}),
-        ("estimated", "estimated or predicted", {"color": _VERMILION, "marker": "x", "linestyle": "none", "markersize": 2.5}),
+        ("truth", "reference path", _BLACK, "-", ""),
+        ("measured", "measured", _GREEN, "", "o"),
+        ("estimated", "estimated or predicted", _VERMILION, "", "x"),
     )
-    for name, label, style in lines:
+    for name, label, colour, dashes, marker in lines:
         known = [row for row in walk if row[f"{name}_x"] is not None]
-        times = [float(str(row["time"])) for row in known]
-        axes.plot(times, [_place(row, name)[0] for row in known], label=label, **style)
+        times, depths = [float(str(row["time"])) for row in known], [_place(row, name)[0] for row in known]
+        axes.plot(
+            times, depths, color=colour, linestyle=dashes, marker=marker, markersize=2.5, linewidth=1.2, label=label
+        )
     axes.set_ylabel("depth (m)")

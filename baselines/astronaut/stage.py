@@ -28,7 +28,9 @@ from tracker.sampling import Box
 CAMERA = CameraPose(-3.9, 0.0, 1.0, 0.0)
 """The camera hovers at one end of the cabin, half way up, and looks along it."""
 SETTINGS = TrackerSettings()
-"""Of the tracker, as the paper has them."""
+"""Of the tracker: the paper's, but for the depth of people whose boxes overlap."""
+PRINTED = dataclasses.replace(SETTINGS, depth="printed")
+"""The paper's to the letter."""
 PERIOD = SETTINGS.every / SETTINGS.rate
 """Between two processed frames, s."""
 VISIBLE = 0.25
@@ -109,9 +111,9 @@ class _Told:
 class Watch:
     """A `PersonTracker` that is shown the processed frames only; its clock runs through those between."""
 
-    def __init__(self) -> None:
+    def __init__(self, settings: TrackerSettings = SETTINGS) -> None:
         self._detector = _Told()
-        self.tracker = PersonTracker(self._detector, XTION_PRO.scaled(320, 240), settings=SETTINGS)
+        self.tracker = PersonTracker(self._detector, XTION_PRO.scaled(320, 240), settings=settings)
         self._started = False
 
     def see(self, picture: Picture, detections: Sequence[Detection]) -> Track:

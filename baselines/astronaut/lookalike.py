@@ -191,7 +191,8 @@ def table(rows: Sequence[Mapping[str, Value]]) -> str:
     """
     lines = [
         "| boxes | tracker | episodes | with the wrong person (95 % interval) | switches before / after hidden "
-        "| wrong frames | hidden | stopped, nobody wrong | time to stop, median / p95 (paper 1.0) | false stops per minute |",
+        "| wrong frames | hidden | stopped, nobody wrong | time to stop, median / p95 (paper 1.0) "
+        "| false stops per minute |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for perception in dict.fromkeys(row["perception"] for row in rows):

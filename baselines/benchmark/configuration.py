@@ -16,6 +16,7 @@ from typing import Any
 
 from baselines.benchmark import metrics
 from baselines.benchmark.cells import ENVIRONMENT_IDS, Cell, family_cells, rule_cells, sensitivity_cells, table1_cells
+from baselines.benchmark.pool import Keyed
 from follow_env.config import CameraConfig, RobotConfig, SensorConfig
 
 EPISODES = {"truth": 100, "emulated": 100, "mask": 20, "detector": 20}
@@ -113,12 +114,17 @@ def digest(settings: Mapping[str, Any]) -> str:
     return hashlib.sha256(canonical.encode()).hexdigest()
 
 
-def run_digest(settings: Mapping[str, Any]) -> str:
-    """SHA-256 of the settings and of the code that plays and measures an episode: what runs must share to be mixed."""
-    return digest({**settings, "code": _code_digest()})
+def run_digest(settings: Mapping[str, Any], *also: Path) -> str:
+    """SHA-256 of the settings and of the code that plays and measures an episode: what runs must share to be mixed.
+
+    Args:
+        settings: JSON-able.
+        also: More files of code, of this package.
+    """
+    return digest({**settings, "code": _code_digest(also)})
 
 
-def _code_digest() -> str:
+def _code_digest(also: Iterable[Path]) -> str:
     root = Path(__file__).parents[2]
     files = [
         path for folder in ("follow_env", "tracker", "baselines/controllers") for path in (root / folder).rglob("*.py")
@@ -128,7 +134,7 @@ def _code_digest() -> str:
     files += [Path(__file__).with_name(name) for name in ("assembly.py", "cells.py", "episodes.py", "metrics.py")]
     files.append(Path(__file__).with_name("tracking.py"))
     total = hashlib.sha256()
-    for path in sorted(files):
+    for path in sorted({*files, *also}):
         total.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return total.hexdigest()
 
@@ -146,7 +152,7 @@ def document(plan: Plan, settings: Mapping[str, Any], folder: Path, jobs: int) -
 def text(
     settings: Mapping[str, Any],
     run: str,
-    cells: Mapping[str, Iterable[Cell]],
+    cells: Mapping[str, Iterable[Keyed]],
     seeds: Mapping[str, Any],
     folder: Path,
     jobs: int,

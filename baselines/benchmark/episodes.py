@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import math
 import time
 import warnings
+import zlib
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Any
@@ -49,6 +52,18 @@ class Episode:
     row: Row
     curve: NDArray[np.float64]
     timing: Timing
+
+    def pack(self) -> tuple[str, bytes, str]:
+        """Row, curve and timing as the store keeps them."""
+        curve = zlib.compress(np.ascontiguousarray(self.curve, dtype="<f8").tobytes())
+        row, timing = (json.dumps(part, allow_nan=False) for part in (self.row, dataclasses.astuple(self.timing)))
+        return row, curve, timing
+
+    @classmethod
+    def unpack(cls, row: str, curve: bytes, timing: str) -> Episode:
+        """The episode of which these are the packed parts."""
+        points = np.frombuffer(zlib.decompress(curve), dtype="<f8").astype(np.float64).reshape(-1, 3)
+        return cls(json.loads(row), points, Timing(*json.loads(timing)))
 
 
 EpisodeFunction = Callable[[Cell, int], Episode]

@@ -69,7 +69,7 @@ def draw_curves(records: Sequence[Record], folder: Path) -> list[Path]:
         for (scene, quantity), figure_number in _FIGURE_NUMBERS.items():
             path = folder / f"figure{figure_number}_{scene}_{quantity}_{perception}.png"
             chosen = _select(records, perception=perception, scene=scene, quantity=quantity)
-            with _picture(path, width=5.6, height=3.9) as figure:
+            with picture(path, width=5.6, height=3.9) as figure:
                 axes = figure.subplots()
                 for estimator in ESTIMATORS:
                     _draw_curve(axes, _select(chosen, estimator=estimator), estimator)
@@ -92,7 +92,7 @@ def draw_sensitivity(records: Sequence[Record], path: Path) -> None:
     """
     from matplotlib.ticker import FuncFormatter, LogLocator
 
-    with _picture(path, width=7.2, height=5.8) as figure:
+    with picture(path, width=7.2, height=5.8) as figure:
         panels = _panels(figure, share_y="col")
         for scene, quantity, axes in panels:
             chosen = _select(records, scene=scene, quantity=quantity)
@@ -129,7 +129,7 @@ def draw_sensors(records: Sequence[Record], path: Path) -> None:
         path: The picture; its folder exists.
     """
     sensors = list(dict.fromkeys(str(record["sensor"]) for record in records))
-    with _picture(path, width=7.2, height=2.6 + 0.56 * len(sensors)) as figure:
+    with picture(path, width=7.2, height=2.6 + 0.56 * len(sensors)) as figure:
         panels = _panels(figure, share_y=True)
         for scene, quantity, axes in panels:
             chosen = _select(records, scene=scene, quantity=quantity)
@@ -232,7 +232,7 @@ def _legend_below(figure: Figure, axes: Axes, columns: int) -> None:
 
 
 @contextmanager
-def _picture(path: Path, width: float, height: float) -> Iterator[Figure]:
+def picture(path: Path, width: float, height: float) -> Iterator[Figure]:
     """A figure of the given size in inches, saved without a display and without anything that names the software."""
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -9,27 +9,37 @@ import signal
 import threading
 import traceback
 from collections import deque
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from typing import Protocol, TypeVar
 
-from baselines.benchmark.cells import Cell
-from baselines.benchmark.episodes import Episode, EpisodeFunction
 
-Task = tuple[Cell, int]
+class Keyed(Protocol):
+    """What is played: a cell of a benchmark, a part of an experiment."""
+
+    @property
+    def key(self) -> str:
+        """A stable name, the same in every process and version."""
+
+
+Kind = TypeVar("Kind", bound=Keyed)
+Result = TypeVar("Result")
 
 
 class EpisodeError(RuntimeError):
     """An episode could not be played to its end; the message names it and holds the traceback."""
 
 
-def play_all(episode: EpisodeFunction, tasks: Sequence[Task], jobs: int) -> Generator[tuple[Task, Episode], None, None]:
+def play_all(
+    episode: Callable[[Kind, int], Result], tasks: Sequence[tuple[Kind, int]], jobs: int
+) -> Generator[tuple[tuple[Kind, int], Result], None, None]:
     """Play the tasks and yield each with its episode as soon as it is finished, in no particular order.
 
     Args:
         episode: Plays one task. With several jobs it must be picklable: a module's function, or an instance.
-        tasks: Cells and seeds; they are started in this order.
+        tasks: What to play, with its seed; they are started in this order.
         jobs: Number of processes; 1 plays in this one.
 
     Raises:
@@ -40,7 +50,9 @@ def play_all(episode: EpisodeFunction, tasks: Sequence[Task], jobs: int) -> Gene
     return _play_in_workers(episode, tasks, min(jobs, len(tasks)))
 
 
-def _play_here(episode: EpisodeFunction, tasks: Sequence[Task]) -> Generator[tuple[Task, Episode], None, None]:
+def _play_here(
+    episode: Callable[[Kind, int], Result], tasks: Sequence[tuple[Kind, int]]
+) -> Generator[tuple[tuple[Kind, int], Result], None, None]:
     for task in tasks:
         try:
             result = episode(*task)
@@ -50,10 +62,10 @@ def _play_here(episode: EpisodeFunction, tasks: Sequence[Task]) -> Generator[tup
 
 
 def _play_in_workers(
-    episode: EpisodeFunction, tasks: Sequence[Task], jobs: int
-) -> Generator[tuple[Task, Episode], None, None]:
+    episode: Callable[[Kind, int], Result], tasks: Sequence[tuple[Kind, int]], jobs: int
+) -> Generator[tuple[tuple[Kind, int], Result], None, None]:
     waiting = deque(tasks)
-    playing: dict[Connection, Task] = {}
+    playing: dict[Connection, tuple[Kind, int]] = {}
     processes: dict[Connection, BaseProcess] = {}
     try:
         for _ in range(jobs):
@@ -92,7 +104,7 @@ class _Failure:
     traceback: str
 
 
-def _start(episode: EpisodeFunction) -> tuple[Connection, BaseProcess]:
+def _start(episode: Callable[[Kind, int], Result]) -> tuple[Connection, BaseProcess]:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(theirs, episode), daemon=True)
@@ -102,7 +114,7 @@ def _start(episode: EpisodeFunction) -> tuple[Connection, BaseProcess]:
     return ours, process
 
 
-def _hand_over(connection: Connection, task: Task) -> None:
+def _hand_over(connection: Connection, task: tuple[Keyed, int]) -> None:
     """Send a task; a worker that has died is noticed where its answer is awaited."""
     with contextlib.suppress(BrokenPipeError):
         connection.send(task)
@@ -121,13 +133,13 @@ def _interrupts_ignored() -> Iterator[None]:
         signal.signal(signal.SIGINT, previous)
 
 
-def _serve(connection: Connection, episode: EpisodeFunction) -> None:
+def _serve(connection: Connection, episode: Callable[[Kind, int], Result]) -> None:
     """A worker's life: receive a task, send its episode, until it is terminated or the parent is gone."""
     threading.Thread(target=_exit_with_parent, daemon=True).start()
     while True:
         task = connection.recv()
         try:
-            result: Episode | _Failure = episode(*task)
+            result: Result | _Failure = episode(*task)
         except Exception:
             result = _Failure(traceback.format_exc())
         connection.send(result)
@@ -140,5 +152,5 @@ def _exit_with_parent() -> None:
     os._exit(1)
 
 
-def _name(task: Task) -> str:
+def _name(task: tuple[Keyed, int]) -> str:
     return f"the episode {task[0].key} with seed {task[1]}"

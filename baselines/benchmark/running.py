@@ -13,13 +13,13 @@ from baselines.benchmark.cells import Cell
 from baselines.benchmark.episodes import Episode, EpisodeFunction
 from baselines.benchmark.files import Value, write_csv, write_text
 from baselines.benchmark.metrics import Row
-from baselines.benchmark.pool import Task, play_all
+from baselines.benchmark.pool import Kind, play_all
 from baselines.benchmark.progress import progress
 from baselines.benchmark.report import markdown_table
-from baselines.benchmark.store import InputError, Store
+from baselines.benchmark.store import InputError, Packable, Store
 
 CONFIG = "config.json"
-_RESULTS = (CONFIG, "table1.csv", "table1.md", "followers.csv", "followers.md", "episodes.csv")
+_RESULTS = (CONFIG, "table1.csv", "table1.md", "followers.csv", "followers.md", "astronaut.md", "episodes.csv")
 _TIMING_COLUMNS = (
     *("cell", "seed", "policy_step_mean_s", "policy_step_p95_s"),
     *("environment_step_mean_s", "metrics_step_mean_s"),
@@ -35,7 +35,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 def run(
-    tasks: Sequence[Task],
+    tasks: Sequence[tuple[Cell, int]],
     digest: str,
     config: str,
     episode: EpisodeFunction,
@@ -44,7 +44,7 @@ def run(
     jobs: int,
     resume: bool,
 ) -> str:
-    """Play the tasks that the folder lacks, then write every result into it.
+    """Play the episodes that the folder lacks, then write every result into it; see `complete`.
 
     Args:
         tasks: Cells and seeds, each once.
@@ -53,6 +53,38 @@ def run(
         episode: Plays one cell and seed; picklable when several jobs are used.
         write: Writes tables and figures from the finished episodes; returns the report and the episodes of its table,
             whose costs `timing.csv` and `timing.md` then hold.
+        out: Results folder.
+        jobs: Number of processes.
+        resume: Whether to go on with what the folder holds.
+    """
+
+    def write_all(episodes: Store, done: str) -> str:
+        text, table = write(episodes)
+        _write_timing(out, table, done)
+        return text
+
+    return complete(tasks, digest, config, episode, write_all, out, jobs, resume)
+
+
+def complete(
+    tasks: Sequence[tuple[Kind, int]],
+    digest: str,
+    config: str,
+    play: Callable[[Kind, int], Packable],
+    write: Callable[[Store, str], str],
+    out: Path,
+    jobs: int,
+    resume: bool,
+) -> str:
+    """Play the tasks that the folder lacks, keep each, then write every result.
+
+    Args:
+        tasks: What to play and the seed, each pair once.
+        digest: Hash of all that results in one folder must share.
+        config: Text of ``config.json``.
+        play: Plays one task; picklable when several jobs are used.
+        write: Writes everything from the finished tasks, given a sentence that says what playing them took; returns
+            the report.
         out: Results folder; made when missing.
         jobs: Number of processes. The results do not depend on it.
         resume: Whether to go on with the episodes that the folder already holds.
@@ -76,13 +108,11 @@ def run(
             with _writable(out):
                 write_text(out / CONFIG, config)
             began, missing = time.perf_counter(), len(_missing(tasks, episodes))
-            _play_missing(tasks, episode, episodes, jobs)
+            _play_missing(tasks, play, episodes, jobs)
             spent = time.perf_counter() - began
             with _writable(out):
-                text, table = write(episodes)
                 done = f"{missing} episodes played in {spent:.0f} s by {jobs} process{'es' if jobs > 1 else ''}."
-                _write_timing(out, table, done)
-            return text
+                return write(episodes, done)
         except KeyboardInterrupt:
             kept = len(tasks) - len(_missing(tasks, episodes))
             raise Interrupted(
@@ -143,14 +173,16 @@ def _writable(out: Path) -> Iterator[None]:
         ) from error
 
 
-def _play_missing(tasks: Sequence[Task], episode: EpisodeFunction, episodes: Store, jobs: int) -> None:
+def _play_missing(
+    tasks: Sequence[tuple[Kind, int]], play: Callable[[Kind, int], Packable], episodes: Store, jobs: int
+) -> None:
     missing = _missing(tasks, episodes)
     if missing:
-        with contextlib.closing(play_all(episode, missing, jobs)) as playing:
+        with contextlib.closing(play_all(play, missing, jobs)) as playing:
             for (cell, seed), result in progress(playing, total=len(tasks), done=len(tasks) - len(missing)):
                 episodes.add(cell, seed, result)
 
 
-def _missing(tasks: Sequence[Task], episodes: Store) -> list[Task]:
+def _missing(tasks: Sequence[tuple[Kind, int]], episodes: Store) -> list[tuple[Kind, int]]:
     finished = episodes.finished()
     return [(cell, seed) for cell, seed in tasks if (cell.key, seed) not in finished]

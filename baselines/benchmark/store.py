@@ -7,18 +7,15 @@ and lets several processes write to one store.
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import sqlite3
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Protocol, TypeVar
 
-import numpy as np
-
-from baselines.benchmark.cells import Cell
-from baselines.benchmark.episodes import Episode, Timing
+from baselines.benchmark.episodes import Episode
+from baselines.benchmark.pool import Keyed
 
 FILE_NAME = "episodes.sqlite"
 _APPLICATION = 0x666F6C77  # "folw": tells our files from other programs' databases
@@ -38,6 +35,18 @@ _EPISODES_AS_BYTES = """
 SELECT CAST(cell AS BLOB), seed, CAST(row AS BLOB), curve, CAST(timing AS BLOB), checksum FROM episode
 """
 _LOCK_PATIENCE = 60.0
+_Packed = TypeVar("_Packed", bound="Packable")
+
+
+class Packable(Protocol):
+    """A result that the store can keep: three parts, of which any may be empty."""
+
+    def pack(self) -> tuple[str, bytes, str]:
+        """Row, curve and timing."""
+
+    @classmethod
+    def unpack(cls: type[_Packed], row: str, curve: bytes, timing: str) -> _Packed:
+        """The result of which these are the parts, exactly as it was packed."""
 
 
 class InputError(ValueError):
@@ -84,15 +93,13 @@ class Store:
         with self._explained():
             return set(self._connection.execute("SELECT cell, seed FROM episode"))
 
-    def add(self, cell: Cell, seed: int, episode: Episode) -> None:
+    def add(self, cell: Keyed, seed: int, episode: Packable) -> None:
         """Keep an episode, in a transaction of its own; one that is there already stays as it is.
 
         Raises:
             InputError: If the file cannot be written.
         """
-        row = json.dumps(episode.row, allow_nan=False)
-        curve = zlib.compress(np.ascontiguousarray(episode.curve, dtype="<f8").tobytes())
-        timing = json.dumps(dataclasses.astuple(episode.timing), allow_nan=False)
+        row, curve, timing = episode.pack()
         checksum = _sum(cell.key.encode(), seed, row.encode(), curve, timing.encode())
         with self._explained():
             self._connection.execute(
@@ -100,8 +107,12 @@ class Store:
                 (cell.key, seed, row, curve, timing, checksum),
             )
 
-    def episode(self, cell: Cell, seed: int) -> Episode:
-        """The finished episode of a cell and seed, exactly as it was added.
+    def episode(self, cell: Keyed, seed: int) -> Episode:
+        """The finished episode of a cell and seed, exactly as it was added; a KeyError if it is not there."""
+        return self.result(cell, seed, Episode)
+
+    def result(self, cell: Keyed, seed: int, kind: type[_Packed]) -> _Packed:
+        """The finished result of a kind, exactly as it was added.
 
         Raises:
             KeyError: If it is not there.
@@ -112,12 +123,7 @@ class Store:
             ).fetchone()
         if found is None:
             raise KeyError(f"no episode of {cell.key} with seed {seed}")
-        row, curve, timing = found
-        return Episode(
-            row=json.loads(row),
-            curve=np.frombuffer(zlib.decompress(curve), dtype="<f8").astype(np.float64).reshape(-1, 3),
-            timing=Timing(*json.loads(timing)),
-        )
+        return kind.unpack(*found)
 
     def _check(self) -> None:
         """Refuse a file that is damaged or another program's, before anything is written to it and any work is done."""

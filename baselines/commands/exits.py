@@ -50,13 +50,22 @@ def detecting() -> Iterator[None]:
 def playing(out: Path) -> Iterator[Player]:
     """Lend a player for a run that keeps its episodes in ``out``; an episode that breaks ends the command."""
     from baselines.benchmark.episodes import Player
-    from baselines.benchmark.pool import EpisodeError
 
     player = Player()
     try:
-        yield player
+        with keeping(out):
+            yield player
+    finally:
+        player.close()
+
+
+@contextmanager
+def keeping(out: Path) -> Iterator[None]:
+    """Let an episode that breaks end the command with a sentence that says what ``out`` still holds."""
+    from baselines.benchmark.pool import EpisodeError
+
+    try:
+        yield
     except EpisodeError as error:
         sentence = f"{error}\nWhat was finished is kept in {out}: --resume goes on with it."
         raise CommandError(sentence, FAILED) from error
-    finally:
-        player.close()

@@ -33,6 +33,7 @@ def follow(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     [
         ["--help"],
         ["reproduce", "table1", "--help"],
+        ["reproduce", "astronaut", "--help"],
         ["watch", "--help"],
         ["speed", "--help"],
         ["track", "--help"],
@@ -56,7 +57,7 @@ def test_help_imports_nothing_heavy(arguments: list[str], tmp_path: Path) -> Non
         ([], "the following arguments are required: COMMAND"),
         (["fly"], "invalid choice: 'fly'"),
         (["reproduce"], "the following arguments are required: TABLE"),
-        (["reproduce", "table2"], "invalid choice: 'table2' (choose from 'table1')"),
+        (["reproduce", "table2"], "invalid choice: 'table2' (choose from 'table1', 'astronaut')"),
         ([*TABLE1, "--episodes", "-3"], "--episodes: '-3' is not a whole number of at least 1"),
         ([*TABLE1, "--episodes", "0"], "--episodes: '0' is not a whole number of at least 1"),
         ([*TABLE1, "--episodes", "2.5"], "--episodes: '2.5' is not a whole number of at least 1"),

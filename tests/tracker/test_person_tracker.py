@@ -400,6 +400,8 @@ def test_bad_input_is_one_sentence():
         TrackerSettings(every=0)
     with pytest.raises(ValueError, match="frame is 'world'"):
         TrackerSettings(frame="world")
+    with pytest.raises(ValueError, match="depth is 'nearest'"):
+        TrackerSettings(depth="nearest")
 
 
 def test_streams_of_any_rate_are_processed_about_ten_times_a_second():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tracker.geometry import XTION_PRO, project
-from tracker.sampling import RULES, box_depth, measure
+from tracker.sampling import RULES, box_depth, depths_apart, measure
 
 GRID = (2, 3, 5, 6, 8)  # rows and columns of the 5x5 grid in a box over a 10x10 picture
 WHOLE = (0.0, 0.0, 10.0, 10.0)
@@ -146,6 +146,62 @@ def test_any_visible_sliver_can_be_read(rule):
     depth = picture(2.0)
     for low, high in ((0.0, 1e-9), (9.999999999, 12.0), (-3.0, 0.4), (4.999, 5.001)):
         assert box_depth(depth, (low, low, high, high), rule) == 2.0
+
+
+def show(*people):
+    """Return the depth of flat people ((u0, v0, u1, v1), depth) before a wall at 5 m, and the visible parts' boxes."""
+    depth, owner = picture(5.0, 120, 160), np.full((120, 160), -1)
+    for index in sorted(range(len(people)), key=lambda i: -people[i][1]):
+        (u0, v0, u1, v1), z = people[index]
+        depth[v0:v1, u0:u1], owner[v0:v1, u0:u1] = z, index
+    boxes = []
+    for index in range(len(people)):
+        rows, columns = np.nonzero(owner == index)
+        boxes.append(tuple(map(float, (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1))))
+    return depth, boxes
+
+
+def test_people_apart_have_the_depths_of_their_boxes():
+    depth, boxes = show(((10, 20, 50, 110), 3.0), ((80, 20, 120, 110), 2.0))
+
+    assert depths_apart(depth, boxes) == [box_depth(depth, box) for box in boxes] == [3.0, 2.0]
+    assert depths_apart(depth, []) == []
+
+
+@pytest.mark.parametrize("left", range(-30, 31, 5))
+def test_who_steps_in_front_never_lends_the_hidden_one_a_depth(left):
+    """The target at 3 m in every stage of being hidden by somebody of its width at 2 m, whose legs are farther down."""
+    target, other = ((60, 20, 100, 100), 3.0), ((60 + left, 10, 100 + left, 115), 2.0)
+    if left == 0:
+        target = ((55, 20, 105, 100), 3.0)
+    depth, boxes = show(target, other)
+
+    of_target, of_other = depths_apart(depth, boxes)
+    assert of_target in (3.0, 5.0, None)
+    assert of_other == 2.0
+    if abs(left) >= 20:
+        assert of_target == 3.0
+    swapped = depths_apart(depth, boxes[::-1])
+    assert swapped == [of_other, of_target]
+
+
+def test_as_printed_the_hidden_one_gets_the_depth_of_who_hides_it():
+    depth, boxes = show(((55, 20, 105, 100), 3.0), ((60, 10, 100, 115), 2.0))
+
+    assert box_depth(depth, boxes[0]) == 2.0
+    assert depths_apart(depth, boxes)[0] != 2.0
+
+
+def test_a_person_in_front_of_another_whose_box_surrounds_it_keeps_its_depth():
+    depth, boxes = show(((60, 40, 100, 110), 2.0), ((50, 20, 110, 110), 3.0))
+
+    assert depths_apart(depth, boxes) == [2.0, 3.0]
+
+
+def test_two_boxes_of_one_person_both_have_its_depth():
+    depth, (box,) = show(((60, 20, 100, 110), 2.0))
+
+    assert depths_apart(depth, [box, box]) == [2.0, 2.0]
 
 
 def test_measurement_finds_a_person_where_it_stands():

@@ -38,10 +38,8 @@ class PersonDetector:
 
     def __init__(self, net: str = "light", weights: Path | None = None, threads: int = 1) -> None:
         choose("net", net, NETS)
-        if weights is None:
-            weights = shipped_weights(net)
         torch.set_num_threads(threads)
-        self.network = load_network(net, weights)
+        self.network = load_network(net, weights or shipped_weights(net))
         self._priors = prior_boxes(self.network.config.layers)
 
     def detect(

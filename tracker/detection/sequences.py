@@ -4,23 +4,26 @@ The paper shows volunteers on the ground; here it is our people, with the headst
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from follow_env.camera import CameraPose, PinholeCamera, RGBDFrame
 from follow_env.camera.raster import RasterRenderer
-from follow_env.config import CameraConfig
-from follow_env.person.bodies import Colour, Outfit, load_body
+from follow_env.camera.sensor import RGBDSensor
+from follow_env.config import CameraConfig, SensorConfig
+from follow_env.person.bodies import SUITS, Outfit, load_body
 from follow_env.person.walker import POSTURES, Walker
 from follow_env.scenes import make_scene
-from tracker.detection.detector import PersonDetector
 from tracker.metrics import DetectionCounts, count_detections
+from tracker.person_tracker import Detector
 
-SUITS: dict[str, Colour] = {"green": (0.16, 0.48, 0.28), "blue": (0.13, 0.33, 0.70), "indigo": (0.18, 0.16, 0.42)}
-"""Colours of the suits, sRGB: three spacesuits, as the paper has it."""
-VIEWS = (CameraPose(4.2, 0.0, 1.0, 0.0), CameraPose(9.3, 1.1, 1.45, math.atan2(-1.0, -2.6)))
-"""Two directions of view on the subject."""
-SUBJECT = (6.7, 0.1)
+SCENE = "cabin"
+VIEWS = (
+    CameraPose(-1.75, 0.15, 1.05, math.atan2(-0.15, 2.65)),
+    CameraPose(3.3, 1.0, 1.15, math.atan2(-1.0, -2.4)),
+)
+"""Two directions of view on the subject: along the module from one end, across it from the other; both from 2.6 m."""
+SUBJECT = (0.9, 0.0)
 """Where the subject turns, m."""
 TURNS = 1.0
 """Turns in each posture."""
@@ -34,6 +37,15 @@ class Sequence:
     view: int
     frames: int
 
+    def posture(self, frame: int) -> str:
+        """Return the posture in a frame: one of `POSTURES` after the other, for equally long."""
+        return POSTURES[frame * len(POSTURES) // self.frames]
+
+    def part(self, number: int) -> range:
+        """Return the frames of a posture by its number in `POSTURES`."""
+        first, after = (-(-k * self.frames // len(POSTURES)) for k in (number, number + 1))
+        return range(first, after)
+
 
 TABLE_2 = (
     Sequence("green", 1, 1850),
@@ -46,20 +58,25 @@ TABLE_2 = (
 """The paper's sequences and their lengths."""
 
 
-def play(sequence: Sequence) -> Iterator[RGBDFrame]:
-    """Yield the frames: the subject takes one posture after the other and turns about once in each."""
-    renderer = RasterRenderer(make_scene("indoor"), PinholeCamera(CameraConfig()))
+def play(sequence: Sequence, frames: Iterable[int] | None = None) -> Iterator[RGBDFrame]:
+    """Yield frames, all by default: the subject takes one posture after the other and turns about once in each.
+
+    They have the sensor's errors, which are the same for every suit; the ids are exact.
+    """
+    camera = PinholeCamera(CameraConfig())
+    renderer, config = RasterRenderer(make_scene(SCENE), camera), SensorConfig()
+    sensor = RGBDSensor(config.depth, config.colour, camera)
     colour = SUITS[sequence.suit]
     walker = Walker(load_body("man", Outfit(shirt=colour, trousers=colour), "high"))
-    for frame in range(sequence.frames):
-        posture, share = divmod(frame * len(POSTURES) / sequence.frames, 1.0)
-        heading = 2.0 * math.pi * TURNS * share
-        name = POSTURES[int(posture)]
-        yield renderer.render(VIEWS[sequence.view - 1], [walker.place(*SUBJECT, heading, 1.3 * share, 0.8, name)])
+    for frame in range(sequence.frames) if frames is None else frames:
+        share = math.fmod(frame * len(POSTURES) / sequence.frames, 1.0)
+        heading, posture = 2.0 * math.pi * TURNS * share, sequence.posture(frame)
+        person = walker.place(*SUBJECT, heading, 1.3 * share, 0.8, posture)
+        yield sensor.corrupt(renderer.render(VIEWS[sequence.view - 1], [person]), 1_000_000 * sequence.view + frame)
 
 
-def count(detector: PersonDetector, sequence: Sequence) -> DetectionCounts:
-    """Return the paper's counts for a sequence, at its confidence of 0.5 and an overlap of 0.5."""
+def count(detector: Detector, sequence: Sequence) -> DetectionCounts:
+    """Return the paper's counts for a sequence, at the detector's confidence and an overlap of 0.5."""
     truth, found = [], []
     for frame in play(sequence):
         truth.append(frame.person_box())

@@ -1,11 +1,13 @@
 """The sequences of Table 2: the subject is always there, turns in every posture, and is counted as the paper counts."""
 
+import cv2
 import numpy as np
 import pytest
 
+from follow_env.person.bodies import SUITS
 from follow_env.person.walker import POSTURES
 from tracker.detection.boxes import Detection
-from tracker.detection.sequences import SUITS, TABLE_2, VIEWS, Sequence, count, play
+from tracker.detection.sequences import TABLE_2, VIEWS, Sequence, count, play
 
 SHORT = [Sequence(suit, view, 3 * len(POSTURES)) for suit in SUITS for view in range(1, 1 + len(VIEWS))]
 
@@ -40,7 +42,35 @@ def test_the_suit_is_what_differs() -> None:
     np.testing.assert_array_equal(green.ids, blue.ids)
     assert green.rgb[body].mean(axis=0).argmax() == 1
     assert blue.rgb[body].mean(axis=0).argmax() == 2
-    np.testing.assert_array_equal(green.rgb[~body], blue.rgb[~body])
+    blurred = cv2.dilate(body.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0  # the sensor's
+    np.testing.assert_array_equal(green.rgb[~blurred], blue.rgb[~blurred])
+
+
+@pytest.mark.parametrize("frames", [3, len(POSTURES), 25, 1850, 2131])
+def test_the_parts_of_a_sequence_are_its_postures(frames: int) -> None:
+    row = Sequence("green", 1, frames)
+    parts = [row.part(number) for number in range(len(POSTURES))]
+    assert [frame for part in parts for frame in part] == list(range(frames))
+    assert all(row.posture(frame) == POSTURES[k] for k, part in enumerate(parts) for frame in part)
+
+
+def test_a_part_shows_what_the_whole_shows() -> None:
+    row = SHORT[1]
+    whole, part = list(play(row)), list(play(row, row.part(2)))
+    for frame, alone in zip(whole[row.part(2).start :], part, strict=False):
+        np.testing.assert_array_equal(frame.rgb, alone.rgb)
+        np.testing.assert_array_equal(frame.depth, alone.depth)
+
+
+@pytest.mark.parametrize("view", range(1, 1 + len(VIEWS)))
+def test_the_subject_is_well_in_view_of_both_cameras(view: int) -> None:
+    for frame in play(Sequence("blue", view, 3 * len(POSTURES))):
+        u0, v0, u1, v1 = frame.person_box() or (0.0, 0.0, 0.0, 0.0)
+        height, width = frame.ids.shape
+        assert 20.0 < u0 < u1 < width - 20.0  # nothing is cut off at the sides
+        assert v1 - v0 > 0.4 * height
+        seen = frame.depth[(frame.ids == 1) & (frame.depth > 0.0)]
+        assert 2.0 < np.median(seen) < 3.0
 
 
 def test_counts_of_a_perfect_a_blind_and_a_blinking_detector() -> None:

@@ -1,0 +1,1 @@
+"""Paper A's experiments, made again in the cabin."""

@@ -1,0 +1,456 @@
+"""Paper A's second experiment (Figures 17 and 18): a second person in the same clothes, and of the same body.
+
+An episode, drawn from its seed and from nothing else:
+
+1. the target is alone, moves gently at its place and is confirmed as the largest, most central person;
+2. the other one enters beside the camera, comes close to the target until they stand shoulder to shoulder, and passes
+   behind it to its other side or steps away and back: the tracker must stay with the target (Figure 17);
+3. the other one steps between camera and target and stays: the tracker must stop after a second, and never follow the
+   other person (Figure 18).
+
+**Right and wrong.** In a frame with an accepted measurement the tracker is wrong if its box overlaps the other person's
+true box more than the target's, and at nobody's if it overlaps neither. A switch is a wrong frame after a right one.
+
+**Hidden.** The target is visible while at least half of its pixels are; the occlusion starts with the first processed
+frame from which it stays hidden for longer than a second. A stop while it is visible is a false one; if the target is
+nearly whole then, a person names it again, as the paper's alarm asks for.
+
+**Two trackers** see the same detections: ours, and the paper's to the letter, which reads the depth of whoever steps
+before the target out of the target's box, follows that depth inside the gate, and so adopts the other person.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby, pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.random import Generator
+from scipy.stats import binomtest
+
+from baselines.astronaut.stage import CAMERA, PERIOD, PRINTED, SETTINGS, Picture, Watch, stage
+from baselines.benchmark.figures import picture
+from baselines.benchmark.files import Value
+from follow_env.camera.mesh import Placed
+from follow_env.person.bodies import BODIES, SUITS, Outfit, load_body
+from follow_env.person.walker import Walker
+from tracker.detection.boxes import Detection
+from tracker.metrics import overlap
+from tracker.person_tracker import Detector, Track
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Row = dict[str, Value]
+
+TARGET, OTHER = 1, 2
+"""Ids of the two."""
+ADULTS = tuple(body for body in BODIES if body != "child")
+POSTURES = ("walk", "bent", "arms_raised")
+"""Of the target: standing or stepping about, bent over its work, arms raised."""
+HALF = 0.5
+"""Least share of the target's pixels that must be visible; with less it is hidden."""
+HIDDEN_TIME = SETTINGS.stop_time
+"""For longer than this the target must stay hidden for an occlusion, s."""
+WHOLE = 0.75
+"""Least visible share of the target at which it is named again after a false stop."""
+
+FILMED = 11
+"""Seed of the episode that is drawn."""
+
+COLUMNS = (
+    *("perception", "seed", "suit", "body", "posture", "distance", "gap", "passes_behind", "step_in"),
+    *("frames", "confirmed_time", "tracked_frames", "wrong_frames", "nobody_frames", "switches", "switches_hidden"),
+    *("gate_rejections", "least_visible", "step_in_time", "occlusion_start", "stop_time"),
+    *("false_stops", "seconds_visible"),
+    *(
+        "printed_wrong_frames",
+        "printed_switches",
+        "printed_switches_hidden",
+        "printed_stop_time",
+        "printed_false_stops",
+    ),
+)
+"""Of a row. `distance` of the target, `gap` between the two when close and `step_in`, how far before the target the
+other one stays, m; frames are processed ones; `switches_hidden` of the switches began when the target was hidden;
+`gate_rejections` are frames with detections, none of which was inside the gate; `least_visible` is the smallest visible
+share before the other one steps in; times in s, empty if there is none; `stop_time` counts from the occlusion's start;
+`seconds_visible` from the first confirmation on. `printed_...` are those of the paper's tracker to the letter, which
+takes its depth samples from the box whosoever they are."""
+
+
+_TRACKERS = {"ours": "", "printed": "printed_"}
+_GREEN, _VERMILION = "#009E73", "#D55E00"
+
+
+@dataclass(frozen=True)
+class Script:
+    """What an episode shows; lengths m, times s, angles rad.
+
+    Attributes:
+        suit, body, posture: Of the target; the other one wears the same suit and has the same body, but walks.
+        distance: Of the target from the camera.
+        left: Where the target is beside the line of sight.
+        heading: Of the target, and of the other one when it stands.
+        sway: Amplitude, period and phase of the target's movement forward and to the left.
+        gap: Between the two when close.
+        passes_behind: Whether the other one passes behind the target; else it steps away and back.
+        step_in: How far before the target the other one stays in the end.
+        keys: Of the other one's way: (time, how much farther than the target, how far to its left), as the camera
+            sees it. With the last three it waits, has stepped in, and the episode ends.
+    """
+
+    suit: str
+    body: str
+    posture: str
+    distance: float
+    left: float
+    heading: float
+    sway: tuple[tuple[float, float, float], tuple[float, float, float]]
+    gap: float
+    passes_behind: bool
+    step_in: float
+    keys: tuple[tuple[float, float, float], ...]
+
+    def target(self, time: float) -> tuple[float, float]:
+        """Return where the target is, (forward, left) of the camera."""
+        forward, left = (size * math.sin(2.0 * math.pi * time / period + phase) for size, period, phase in self.sway)
+        return self.distance + forward, self.left + left
+
+    def other(self, time: float) -> tuple[float, float]:
+        """Return where the other one is, (forward, left) of the camera; it goes from key to key and rests at each."""
+        x, y = self.target(time)
+        range_ = math.hypot(x, y)
+        start, end = next((pair for pair in pairwise(self.keys) if time <= pair[1][0]), (self.keys[-1],) * 2)
+        share = min(max((time - start[0]) / max(end[0] - start[0], 1e-9), 0.0), 1.0)
+        share *= share * (3.0 - 2.0 * share)
+        farther, left = (a + share * (b - a) for a, b in zip(start[1:], end[1:], strict=True))
+        return x + (farther * x - left * y) / range_, y + (farther * y + left * x) / range_
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A processed frame.
+
+    Attributes:
+        time: s.
+        shown: The picture and its truth.
+        found: What was detected.
+        track: What the tracker knows then.
+        printed: What the paper's tracker to the letter knows of the same detections.
+    """
+
+    time: float
+    shown: Picture
+    found: Sequence[Detection]
+    track: Track
+    printed: Track
+
+    def followed(self, track: Track) -> str | None:
+        """Return whose box a tracker accepted: `target`, `other` or `nobody`; None without a measurement."""
+        if track.measurement is None or track.box is None:
+            return None
+        shares = {id: overlap(track.box, box) for id, box in self.shown.boxes.items()}
+        target, other = shares.get(TARGET, 0.0), shares.get(OTHER, 0.0)
+        return "nobody" if target == other == 0.0 else "other" if other > target else "target"
+
+
+def play(seed: int, detector: Detector | None = None) -> Row:
+    """Play an episode and return its row; the same seed and detections give the same row.
+
+    Args:
+        seed: Of the episode, a whole number from 0.
+        detector: Finds the people; None for perfect boxes of who is visible, so that the tracker's errors stand alone.
+
+    Raises:
+        ValueError: If the seed is no whole number from 0.
+    """
+    script = draw_script(seed)
+    row: Row = {"perception": "mask" if detector is None else "detector", "seed": seed}
+    row |= {name: getattr(script, name) for name in ("suit", "body", "posture", "distance", "gap", "step_in")}
+    row |= {"passes_behind": int(script.passes_behind)}
+    ours, printed = [], []
+    for frame in film(seed, detector):
+        ours.append(_Moment.of(frame, frame.track))
+        printed.append(_Moment.of(frame, frame.printed))
+    step_in_time = script.keys[-3][0]
+    row |= _judge(ours, step_in_time)
+    row |= {f"printed_{name}": value for name, value in _judge(printed, step_in_time).items()}
+    return {name: row[name] for name in COLUMNS}
+
+
+def table(rows: Sequence[Mapping[str, Value]]) -> str:
+    """Return a markdown table of totals: a row for the tracker and one for the printed one, for each source of boxes.
+
+    Args:
+        rows: Of any number of episodes.
+    """
+    lines = [
+        "| boxes | tracker | episodes | with the wrong person (95 % interval) | switches before / after hidden "
+        "| wrong frames | hidden | stopped, nobody wrong | time to stop, median / p95 (paper 1.0) "
+        "| false stops per minute |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for perception in dict.fromkeys(row["perception"] for row in rows):
+        chosen = [row for row in rows if row["perception"] == perception]
+        lines += [_table_line(str(perception), name, prefix, chosen) for name, prefix in _TRACKERS.items()]
+    lines += [
+        "",
+        "`ours` takes no depth sample of somebody nearer, `printed` is the paper's to the letter. A switch is a frame "
+        "in which another person's box is accepted after one in which the target's was. The target is hidden when "
+        f"less than {100 * HALF:.0f} % of its pixels are visible for longer than {HIDDEN_TIME:g} s; times count from "
+        "then, in s. Exact (Clopper-Pearson) intervals. Share stopped: of the episodes in which the target was hidden.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def draw(detector: Detector | None, path: Path) -> None:
+    """Draw two film strips, the close pass (Figure 17) and the occlusion (Figure 18), with boxes, states and times.
+
+    Args:
+        detector: As in `play`.
+        path: The picture; its folder exists.
+    """
+    script = draw_script(FILMED)
+    arrival, leaving, stepping, stepped = (script.keys[k][0] for k in (2, 3, -3, -2))
+    behind = 0.5 * (leaving + script.keys[-4][0])
+    strips = (
+        (0.5 * arrival + 0.5 * script.keys[1][0], arrival, leaving, behind, stepping),
+        (stepping + 0.4 * (stepped - stepping), *(stepped - 0.4 + 0.6 * k for k in range(4))),
+    )
+    wanted = {round(time / PERIOD): place for place, time in _places(strips)}
+    with picture(path, width=12.0, height=4.6) as figure:
+        panels = figure.subplots(len(strips), len(strips[0]))
+        for number, frame in enumerate(film(FILMED, detector)):
+            if number in wanted:
+                _draw_frame(panels[wanted[number]], frame)
+        panels[0][0].set_ylabel("close pass")
+        panels[1][0].set_ylabel("occlusion")
+
+
+def film(seed: int, detector: Detector | None = None) -> Iterator[Frame]:
+    """Yield the processed frames of an episode; the arguments are those of `play`."""
+    script = draw_script(seed)
+    colour = SUITS[script.suit]
+    body = load_body(script.body, Outfit(shirt=colour, trousers=colour), "high")
+    target = _Mover(Walker(body, TARGET), script.posture, script.heading)
+    other = _Mover(Walker(body, OTHER), "walk", script.heading)
+    noise = np.random.default_rng((1, seed))
+    watches = (Watch(), Watch(PRINTED))
+    for frame in range(int(script.keys[-1][0] / PERIOD) + 1):
+        time = frame * PERIOD
+        people = [target.go(script.target(time), turns=False)]
+        if time >= script.keys[0][0]:
+            people.append(other.go(script.other(time)))
+        shown = stage().take(people, int(noise.integers(1 << 63)))
+        found = shown.perfect_detections() if detector is None else detector.detect(shown.rgb, shown.depth)
+        tracks = [watch.see(shown, found) for watch in watches]
+        yield Frame(time, shown, found, *tracks)
+        for watch, track in zip(watches, tracks, strict=True):
+            if track.alarm and shown.shares[TARGET] >= WHOLE:
+                watch.tracker.confirm(shown.boxes[TARGET])
+
+
+def draw_script(seed: int) -> Script:
+    """Return what the episode of a seed shows.
+
+    Raises:
+        ValueError: If the seed is no whole number from 0.
+    """
+    if not isinstance(seed, int) or seed < 0:
+        raise ValueError(f"seed is {seed!r}; expected a whole number from 0")
+    rng = np.random.default_rng(seed)
+    distance, gap, step_in = _between(rng, 2.2, 3.2), _between(rng, 0.5, 0.7), _between(rng, 0.7, 1.2)
+    side, passes_behind = -1.0 if rng.random() < 0.5 else 1.0, bool(rng.random() < 0.5)
+    if passes_behind:
+        leg = [(0.55, side * gap), (0.55, -side * gap), (0.0, -side * gap)]
+    else:
+        leg = [(0.0, side * (gap + 0.45)), (0.0, side * gap)]
+    stops = [
+        ((0.6 - distance, side * 1.1), 0.0),
+        ((0.0, side * (gap + 0.45)), 0.0),
+        ((0.0, side * gap), _between(rng, 1.0, 3.0)),
+        *((place, 0.0) for place in leg[:-1]),
+        (leg[-1], _between(rng, 0.5, 2.0)),
+        ((-step_in, _between(rng, -0.05, 0.05)), 3.0),
+    ]
+    keys = _timed(stops, _between(rng, 3.0, 4.0), _between(rng, 0.4, 0.9))
+    return Script(
+        suit=_choice(rng, tuple(SUITS)),
+        body=_choice(rng, ADULTS),
+        posture=_choice(rng, POSTURES),
+        distance=distance,
+        left=_between(rng, -0.25, 0.25),
+        heading=(math.pi if rng.random() < 0.7 else 0.0) + _between(rng, -0.6, 0.6),
+        sway=(_sway(rng), _sway(rng)),
+        gap=gap,
+        passes_behind=passes_behind,
+        step_in=step_in,
+        keys=tuple(keys),
+    )
+
+
+def _table_line(perception: str, name: str, prefix: str, rows: Sequence[Mapping[str, Value]]) -> str:
+    def numbers(column: str) -> list[float]:
+        return [float(str(row[column])) for row in rows if row[column] is not None]
+
+    switches, wrong = numbers(f"{prefix}switches"), numbers(f"{prefix}wrong_frames")
+    hidden_switches = sum(numbers(f"{prefix}switches_hidden"))
+    switched = sum(count > 0.0 for count in wrong)
+    low, high = binomtest(switched, len(rows)).proportion_ci(0.95, "exact")
+    hidden = [row for row in rows if row["occlusion_start"] is not None]
+    stopped = sum(row[f"{prefix}stop_time"] is not None and row[f"{prefix}wrong_frames"] == 0 for row in hidden)
+    times = sorted(numbers(f"{prefix}stop_time"))
+    median, late = (f"{np.quantile(times, q):.2f}" for q in (0.5, 0.95)) if times else ("", "")
+    minutes = sum(numbers("seconds_visible")) / 60.0
+    cells = (
+        perception,
+        name,
+        len(rows),
+        f"{switched} ({100 * low:.1f}-{100 * high:.1f} %)",
+        f"{sum(switches) - hidden_switches:.0f} / {hidden_switches:.0f}",
+        f"{sum(wrong):.0f}",
+        len(hidden),
+        f"{stopped} ({100 * stopped / len(hidden):.1f} %)" if hidden else "",
+        f"{median} / {late}",
+        f"{sum(numbers(f'{prefix}false_stops')) / minutes:.2f}" if minutes else "",
+    )
+    return "| " + " | ".join(map(str, cells)) + " |"
+
+
+def _places(strips: Sequence[Sequence[float]]) -> Iterator[tuple[tuple[int, int], float]]:
+    for row, times in enumerate(strips):
+        for column, time in enumerate(times):
+            yield (row, column), time
+
+
+def _draw_frame(axes: Axes, frame: Frame) -> None:
+    """Show a picture: the tracked box green, other detections red, as in the paper; a tracked one is drawn broader."""
+    from matplotlib.patches import Rectangle
+
+    tracked = frame.track.box if frame.track.measurement is not None else None
+    axes.imshow(frame.shown.rgb)
+    for detection in frame.found:
+        u0, v0, u1, v1 = detection.box
+        is_target = tracked is not None and overlap(detection.box, tracked) > 0.99
+        colour, width = (_GREEN, 2.4) if is_target else (_VERMILION, 1.2)
+        axes.add_patch(Rectangle((u0, v0), u1 - u0, v1 - v0, edgecolor=colour, facecolor="none", linewidth=width))
+    axes.set_xlim(0, frame.shown.rgb.shape[1])
+    axes.set_ylim(frame.shown.rgb.shape[0], 0)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.grid(visible=False)
+    axes.set_title(f"{frame.time:.1f} s: {frame.track.state}", fontsize=9)
+
+
+def _between(rng: Generator, low: float, high: float) -> float:
+    return float(rng.uniform(low, high))
+
+
+def _choice(rng: Generator, names: Sequence[str]) -> str:
+    return names[int(rng.integers(len(names)))]
+
+
+def _sway(rng: Generator) -> tuple[float, float, float]:
+    return _between(rng, 0.05, 0.20), _between(rng, 5.0, 9.0), _between(rng, 0.0, 2.0 * math.pi)
+
+
+def _timed(
+    stops: Iterable[tuple[tuple[float, float], float]], time: float, speed: float
+) -> Iterator[tuple[float, float, float]]:
+    """Yield the keys of a way through places at each of which one waits; `speed` is the highest, 1.5 times the mean."""
+    last = None
+    for place, wait in stops:
+        if last is not None:
+            time += 1.5 * math.dist(last, place) / speed
+        yield time, *place
+        if wait > 0.0:
+            time += wait
+            yield time, *place
+        last = place
+
+
+class _Mover:
+    """Moves a walker from place to place: its gait is that of its speed, it turns into its way and back at rest."""
+
+    TURN = 3.0 * PERIOD
+    MOVING = 0.2
+
+    def __init__(self, walker: Walker, posture: str, heading: float) -> None:
+        self._walker, self._posture, self._rest = walker, posture, heading
+        self._heading, self._walked = heading, 0.0
+        self._place: tuple[float, float] | None = None
+
+    def go(self, place: tuple[float, float], turns: bool = True) -> Placed:
+        """Return the person at the next frame's place, (forward, left) of the camera."""
+        x, y = self._place or place
+        step = math.dist((x, y), place)
+        goal = self._rest
+        if turns and step > self.MOVING * PERIOD:
+            goal = math.atan2(place[1] - y, place[0] - x)
+        off = math.remainder(goal - self._heading, 2.0 * math.pi)
+        self._heading += min(max(off, -self.TURN), self.TURN)
+        self._walked += step
+        self._place = place
+        where = CAMERA.x + place[0], CAMERA.y + place[1]
+        return self._walker.place(*where, self._heading, self._walked, step / PERIOD, self._posture)
+
+
+@dataclass(frozen=True)
+class _Moment:
+    """What of a frame the row is made of."""
+
+    time: float
+    share: float
+    state: str
+    confirmed: bool
+    followed: str | None
+    rejected: bool
+
+    @classmethod
+    def of(cls, frame: Frame, track: Track) -> _Moment:
+        rejected = track.measurement is None and track.gate_distance is not None and track.state in ("coasting", "lost")
+        share = frame.shown.shares[TARGET]
+        return cls(frame.time, share, track.state, track.confirmations > 0, frame.followed(track), rejected)
+
+    @property
+    def visible(self) -> bool:
+        return self.share >= HALF
+
+
+def _judge(moments: Sequence[_Moment], step_in_time: float) -> Row:
+    """Return the part of the row that the tracker is responsible for."""
+    tracked = [moment for moment in moments if moment.followed is not None]
+    switched = [b for a, b in pairwise(tracked) if b.followed == "other" and a.followed != "other"]
+    stops = [b for a, b in pairwise(moments) if b.state == "lost" and a.state != "lost"]
+    start = _occlusion(moments)
+    stop = next((m.time for m in stops if start is not None and m.time >= start), None)
+    return {
+        "frames": len(moments),
+        "confirmed_time": next((m.time for m in moments if m.confirmed), None),
+        "tracked_frames": len(tracked),
+        "wrong_frames": sum(m.followed == "other" for m in tracked),
+        "nobody_frames": sum(m.followed == "nobody" for m in tracked),
+        "switches": len(switched),
+        "switches_hidden": sum(not m.visible for m in switched),
+        "gate_rejections": sum(m.rejected for m in moments),
+        "least_visible": min(m.share for m in moments if m.time < step_in_time),
+        "step_in_time": step_in_time,
+        "occlusion_start": start,
+        "stop_time": None if start is None or stop is None else stop - start,
+        "false_stops": sum(m.visible for m in stops),
+        "seconds_visible": PERIOD * sum(m.confirmed and m.visible for m in moments),
+    }
+
+
+def _occlusion(moments: Sequence[_Moment]) -> float | None:
+    """Return when the target began to stay hidden for longer than `HIDDEN_TIME`."""
+    for visible, run in groupby(moments, key=lambda moment: moment.visible):
+        times = [moment.time for moment in run]
+        if not visible and times[-1] - times[0] > HIDDEN_TIME + 0.5 * PERIOD:
+            return times[0]
+    return None

@@ -52,6 +52,8 @@ TARGET, OTHER = 1, 2
 ADULTS = tuple(body for body in BODIES if body != "child")
 POSTURES = ("walk", "bent", "arms_raised")
 """Of the target: standing or stepping about, bent over its work, arms raised."""
+REACH = 0.5
+"""So much farther a bent body reaches forward, m; the other one keeps clear of it, as nobody walks through anybody."""
 HALF = 0.5
 """Least share of the target's pixels that must be visible; with less it is hidden."""
 HIDDEN_TIME = SETTINGS.stop_time
@@ -101,7 +103,7 @@ class Script:
         passes_behind: Whether the other one passes behind the target; else it steps away and back.
         step_in: How far before the target the other one stays in the end.
         keys: Of the other one's way: (time, how much farther than the target, how far to its left), as the camera
-            sees it. With the last three it waits, has stepped in, and the episode ends.
+            sees it. The last four: it leaves the target's side, is before it, has stepped in, and the episode ends.
     """
 
     suit: str
@@ -115,6 +117,11 @@ class Script:
     passes_behind: bool
     step_in: float
     keys: tuple[tuple[float, float, float], ...]
+
+    @property
+    def step_in_time(self) -> float:
+        """When the other one leaves the target's side for the last time."""
+        return self.keys[-4][0]
 
     def target(self, time: float) -> tuple[float, float]:
         """Return where the target is, (forward, left) of the camera."""
@@ -177,7 +184,7 @@ def play(seed: int, detector: Detector | None = None) -> Row:
     for frame in film(seed, detector):
         ours.append(_Moment.of(frame, frame.track))
         printed.append(_Moment.of(frame, frame.printed))
-    step_in_time = script.keys[-3][0]
+    step_in_time = script.step_in_time
     row |= _judge(ours, step_in_time)
     row |= {f"printed_{name}": value for name, value in _judge(printed, step_in_time).items()}
     return {name: row[name] for name in COLUMNS}
@@ -216,8 +223,8 @@ def draw(detector: Detector | None, path: Path) -> None:
         path: The picture; its folder exists.
     """
     script = draw_script(FILMED)
-    arrival, leaving, stepping, stepped = (script.keys[k][0] for k in (2, 3, -3, -2))
-    behind = 0.5 * (leaving + script.keys[-4][0])
+    arrival, leaving, passed, stepping, stepped = (script.keys[k][0] for k in (2, 3, -5, -4, -2))
+    behind = 0.5 * (leaving + passed)
     strips = (
         (0.5 * arrival + 0.5 * script.keys[1][0], arrival, leaving, behind, stepping),
         (stepping + 0.4 * (stepped - stepping), *(stepped - 0.4 + 0.6 * k for k in range(4))),
@@ -264,10 +271,15 @@ def draw_script(seed: int) -> Script:
     if not isinstance(seed, int) or seed < 0:
         raise ValueError(f"seed is {seed!r}; expected a whole number from 0")
     rng = np.random.default_rng(seed)
-    distance, gap, step_in = _between(rng, 2.2, 3.2), _between(rng, 0.5, 0.7), _between(rng, 0.7, 1.2)
+    posture = _choice(rng, POSTURES)
+    away = bool(rng.random() < 0.3)
+    reach = REACH if posture == "bent" else 0.0
+    turned = _between(rng, -0.6, 0.6) if posture != "bent" else _between(rng, -0.2, 0.2)
+    distance, gap, step_in = _between(rng, 2.2, 3.2), _between(rng, 0.5, 0.7), _between(rng, 0.7, 1.1)
+    step_in, behind = (step_in, 0.55 + reach) if away else (step_in + reach, 0.55)
     side, passes_behind = -1.0 if rng.random() < 0.5 else 1.0, bool(rng.random() < 0.5)
     if passes_behind:
-        leg = [(0.55, side * gap), (0.55, -side * gap), (0.0, -side * gap)]
+        leg = [(behind, side * gap), (behind, -side * gap), (0.0, -side * gap)]
     else:
         leg = [(0.0, side * (gap + 0.45)), (0.0, side * gap)]
     stops = [
@@ -276,16 +288,17 @@ def draw_script(seed: int) -> Script:
         ((0.0, side * gap), _between(rng, 1.0, 3.0)),
         *((place, 0.0) for place in leg[:-1]),
         (leg[-1], _between(rng, 0.5, 2.0)),
+        ((-step_in, leg[-1][1]), 0.0),
         ((-step_in, _between(rng, -0.05, 0.05)), 3.0),
     ]
     keys = _timed(stops, _between(rng, 3.0, 4.0), _between(rng, 0.4, 0.9))
     return Script(
         suit=_choice(rng, tuple(SUITS)),
         body=_choice(rng, ADULTS),
-        posture=_choice(rng, POSTURES),
+        posture=posture,
         distance=distance,
         left=_between(rng, -0.25, 0.25),
-        heading=(math.pi if rng.random() < 0.7 else 0.0) + _between(rng, -0.6, 0.6),
+        heading=(0.0 if away else math.pi) + turned,
         sway=(_sway(rng), _sway(rng)),
         gap=gap,
         passes_behind=passes_behind,

@@ -160,7 +160,8 @@ def _replay(poses: NDArray[np.float64], commands: Sequence[tuple[float, float]],
     for k, command in enumerate(commands):
         if k % restart == 0:
             pose = tuple(poses[k].tolist())
-        x, y, yaw, left, right, _, _ = roll(*pose, left, right, *command, decay, substeps, robot.track_width)
+        heading = math.cos(pose[2]), math.sin(pose[2])
+        x, y, yaw, left, right, _, _ = roll(*pose, *heading, left, right, *command, decay, substeps, robot.track_width)
         pose = (x, y, yaw)
         true_x, true_y, true_yaw = poses[k + 1].tolist()
         errors.append((math.hypot(x - true_x, y - true_y), math.remainder(yaw - true_yaw, 2.0 * math.pi)))

@@ -17,6 +17,13 @@ def add(commands: Commands) -> None:
     train.add_argument("--steps", type=positive, default=10_000, metavar="N", help="batches (default: %(default)s)")
     add_seed(train)
     train.add_argument("--start", type=Path, metavar="FILE", help="weights to start from instead of random ones")
+    train.add_argument(
+        "--rate", type=float, default=1.5e-3, metavar="R", help="largest learning rate (default: %(default)s)"
+    )
+    train.add_argument(
+        "--walk-share", type=float, default=0.55, metavar="S",
+        help="share of the people who walk, besides those of all postures (default: %(default)s)",
+    )  # fmt: skip
     train.add_argument("--out", type=Path, metavar="DIR", help="folder of the run (default: results/detector-NET)")
     train.add_argument("--resume", action="store_true", help="go on with the run that the folder holds")
     add_jobs(train)

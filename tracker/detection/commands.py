@@ -17,14 +17,15 @@ from tracker.detection.training import train as train_network
 
 
 def train(parsed: argparse.Namespace) -> str:
-    """Train `net` for `steps` from `seed`, perhaps from the weights `start`, into the folder `out`."""
+    """Train `net` for `steps` from `seed` at `rate`, perhaps from the weights `start`, into the folder `out`."""
     out = parsed.out or Path("results", f"detector-{parsed.net}")
     config = TrainConfig(
         net=parsed.net,
         steps=parsed.steps,
         seed=parsed.seed,
+        rate=parsed.rate,
         start=None if parsed.start is None else str(parsed.start),
-        data=DataConfig(depth=NETS[parsed.net].depth),
+        data=DataConfig(walk_share=parsed.walk_share, depth=NETS[parsed.net].depth),
     )
     result = train_network(config, out, parsed.jobs, parsed.resume, _tell)
     return f"Held-out AP {result.ap:.3f}; the run is in {out}, its weights are {out / 'weights.safetensors'}."

@@ -42,6 +42,7 @@ class DataConfig:
         pitch_deg, roll_deg: largest inclination of the camera, degrees.
         zoom: largest enlargement of a crop.
         crop_share: share of the pictures that are cropped.
+        walk_share: share of the people who walk, besides those of all postures.
         pictures_per_scene: pictures before another scene is built.
         min_pixels: a person of fewer visible pixels (of 300 x 300) is difficult.
         min_share: so is one whose visible share of what lies inside the picture is smaller.
@@ -58,6 +59,7 @@ class DataConfig:
     roll_deg: float = 5.0
     zoom: float = 1.7
     crop_share: float = 0.4
+    walk_share: float = 0.55
     pictures_per_scene: int = 8
     min_pixels: int = 150
     min_share: float = 0.25
@@ -70,6 +72,8 @@ class DataConfig:
             raise ValueError(
                 f"people stand from {self.nearest} to {self.farthest} m; expected 0.5 <= nearest <= farthest <= 20"
             )
+        if not 0.0 <= self.walk_share <= 1.0:
+            raise ValueError(f"walk_share is {self.walk_share}; expected a share from 0 to 1")
         if self.pictures_per_scene < 1 or self.zoom < 1.0:
             raise ValueError(
                 f"pictures_per_scene, zoom are {self.pictures_per_scene}, {self.zoom}; expected at least 1 each"
@@ -186,7 +190,7 @@ class SampleSource:
         name, detail = BODIES[rng.integers(len(BODIES))], "high" if rng.random() < 0.25 else "low"
         names = [*OUTFITS]
         outfit = names[rng.integers(len(names))] if rng.random() < 0.25 else _draw_outfit(rng)
-        posture = "walk" if rng.random() < 0.55 else POSTURES[rng.integers(len(POSTURES))]
+        posture = "walk" if rng.random() < self.config.walk_share else POSTURES[rng.integers(len(POSTURES))]
         heading, walked, speed = rng.uniform(-math.pi, math.pi), rng.uniform(0.0, 1.6), rng.uniform(0.0, 1.8)
         placed = self._walkers[name, detail].place(x, y, heading, walked, speed, posture)
         broad, tall = rng.uniform(0.92, 1.12), rng.uniform(0.92, 1.08)

@@ -70,6 +70,8 @@ class TrainConfig:
         for name in ("steps", "batch", "evaluate_every", "test_pictures"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; expected at least 1")
+        if not 0.0 < self.rate < 0.1:
+            raise ValueError(f"rate is {self.rate}; expected a learning rate above 0 and below 0.1")
         if not 0 <= self.seed < TEST_SEED:
             raise ValueError(f"seed is {self.seed}; expected 0 to {TEST_SEED - 1} (the others are for testing)")
         if NETS[self.net].depth != self.data.depth:

@@ -20,7 +20,9 @@ from follow_env.scenes import LIGHTS, SCENES, make_scene
 
 CAMERA = PinholeCamera(CameraConfig(width=240, height=180, supersample=2))
 EYE = CameraPose(4.0, 0.0, 1.0, 0.0)
-AHEAD, ACROSS = CameraPose(1.0, 0.0, 1.0, 0.0), CameraPose(9.5, -1.2, 1.4, 2.7)
+VIEWS = dict.fromkeys(SCENES, (CameraPose(1.0, 0.0, 1.0, 0.0), CameraPose(9.5, -1.2, 1.4, 2.7), EYE))
+VIEWS["cabin"] = (CameraPose(-2.8, 0.0, 1.0, 0.0), CameraPose(3.2, -0.7, 1.4, 2.7), CameraPose(-3.5, 0.0, 1.0, 0.0))
+"""Where each place is seen from: along it, across it, and by the robot; everywhere else by the robot, `EYE`."""
 DEPTH_RANGE = 8.0
 INK, PAPER = (40, 40, 40), 255
 ID_COLOURS = np.array(((225, 225, 225), (230, 159, 0), (0, 114, 178)), np.uint8)
@@ -63,10 +65,11 @@ def people_sheet() -> list[list[np.ndarray]]:
 
 
 def scenes_sheet() -> list[list[np.ndarray]]:
-    """Both places in each light from two viewpoints with depth and ids, the robot's view, and the primitives."""
+    """Each place in each light from two viewpoints with depth and ids, the robot's view, and the primitives."""
     rows = []
     for name in SCENES:
-        for label, eye, distance, turn in (("along", AHEAD, 2.5, 0.3), ("across", ACROSS, 3.0, -1.0)):
+        ahead, across, _ = VIEWS[name]
+        for label, eye, distance, turn in (("along", ahead, 2.5, 0.3), ("across", across, 3.0, -1.0)):
             frames = {
                 light: shot(make_scene(name, light), eye, person(eye, distance, "man", "orange", turn))
                 for light in LIGHTS
@@ -75,7 +78,8 @@ def scenes_sheet() -> list[list[np.ndarray]]:
             rows.append([*row, depth_tile(frames["normal"]), id_tile(frames["normal"])])
     for name in SCENES:
         place = make_scene(name)
-        frames = {d: shot(place, EYE, person(EYE, d, "woman", "blue")) for d in (1.0, 1.5, 2.5, 4.0)}
+        eye = VIEWS[name][2]
+        frames = {d: shot(place, eye, person(eye, d, "woman", "blue")) for d in (1.0, 1.5, 2.5, 4.0)}
         rows.append([tile(frame.rgb, f"{name}, robot's view at {d:g} m") for d, frame in frames.items()])
     eye = CameraPose(0.0, 0.0, 1.0, 0.0)
     frame = shot(primitives(), eye, person(eye, 2.6, "child", "green", 2.6))

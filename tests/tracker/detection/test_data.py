@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from follow_env.camera.pinhole import CameraPose
+from follow_env.scenes import SCENES
 from tracker.detection.data import CAMERA, DataConfig, SampleSource, without_augmentation
 from tracker.detection.photometry import disturb, draw_backdrop
 from tracker.detection.preview import sheet
@@ -110,7 +111,7 @@ def test_rooms_of_chance_have_room_for_people() -> None:
         x0, x1, y0, y1 = scene.bounds
         spots = np.column_stack([rng.uniform(x0, x1, 60), rng.uniform(y0, y1, 60)])
         assert sum(scene.clearance(spot[None]) > 0.2 for spot in spots) > 10
-    assert {draw_scene(np.random.default_rng(k)).name for k in range(30)} == {"corridor", "indoor", "room"}
+    assert {draw_scene(np.random.default_rng(k)).name for k in range(30)} == {*SCENES, "room"}
 
 
 def test_disturbance_keeps_the_form_of_a_picture_and_repeats() -> None:

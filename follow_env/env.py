@@ -25,7 +25,7 @@ from follow_env.reward import (
     SUCCESS_OUT_OF_VIEW,
     reward_terms,
 )
-from follow_env.routes import ROUTES, Route, make_route
+from follow_env.routes import Route, choose_route, make_route
 from follow_env.scenes import make_scene
 from follow_env.view import Dashboard, import_pygame, show_window
 
@@ -73,7 +73,7 @@ class FollowEnv(gymnasium.Env):
     **Ends**: a collision or a person out of view for more than 5 s terminates; the route's end truncates.
 
     Args:
-        scene: `"corridor"` or `"indoor"`.
+        scene: `"corridor"`, `"indoor"` or `"cabin"` (8 m long: with `route="standing"` only).
         obs: see above.
         action: `"twist"` or `"wheels"`.
         route: `"paper"` (12 m in 14 s, turns up to 50 deg), `"straight"` or `"standing"`.
@@ -123,7 +123,6 @@ class FollowEnv(gymnasium.Env):
             )
         self._obs = choose("obs", obs, OBSERVATIONS)
         self._action = choose("action", action, ACTIONS)
-        self._route_name = choose("route", route, ROUTES)
         self._renderer_name = choose("renderer", renderer, RENDERERS)
         self._person, self._outfit = choose("person", person, BODIES), choose("outfit", outfit, OUTFITS)
         self.render_mode = (
@@ -145,6 +144,7 @@ class FollowEnv(gymnasium.Env):
         self._half_field = math.tan(0.5 * self.camera.hfov)
         self._sensor = sensor_config(sensor)
         self.scene = make_scene(scene, light)
+        self._route_name = choose_route(route, self.scene)
         self._world: World | None = None
         self._renderer: Renderer | None = None
         self._dashboard: Dashboard | None = None
@@ -182,7 +182,8 @@ class FollowEnv(gymnasium.Env):
         x, y, yaw = self.scene.start
         y += float(self.np_random.uniform(-1.0, 1.0)) * self.scene.start_width
         ahead = (x + SET_POINT * math.cos(yaw), y + SET_POINT * math.sin(yaw), yaw)
-        self._route = make_route(options.get("route", self._route_name), self.scene, ahead, self.np_random)
+        route = choose_route(options["route"], self.scene) if "route" in options else self._route_name
+        self._route = make_route(route, self.scene, ahead, self.np_random)
         robot_pose = _pose(options.get("robot_pose", (x, y, yaw)))
         self._steps = 0
         self._person_pose = self._route.pose(self.time)

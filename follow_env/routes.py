@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from follow_env.config import choose
+from follow_env.reward import SET_POINT
 from follow_env.scene import Scene
 
 TABLE_STEP = 0.1
@@ -222,6 +223,17 @@ ROUTES: dict[str, Callable[[Scene, tuple[float, float, float], np.random.Generat
     "standing": standing_route,
 }
 """Route name -> function (scene, start pose of the person, random generator) -> Route."""
+
+
+def choose_route(name: str, scene: Scene) -> str:
+    """Return the name of a route; a ValueError names the nearest, or says that the scene is too short for it."""
+    choose("route", name, ROUTES)
+    if name != "standing" and scene.clearance(Route(scene.start, SET_POINT + 12.0).points()) < CLEARANCE:
+        raise ValueError(
+            f"the route {name!r} needs 12 m of free way, which the scene {scene.name!r} lacks; take route='standing' "
+            "or another scene"
+        )
+    return name
 
 
 def make_route(name: str, scene: Scene, start: tuple[float, float, float], rng: np.random.Generator) -> Route:

@@ -20,7 +20,7 @@ from follow_env.config import RobotConfig, choose
 from follow_env.env import FollowEnv, _pose
 from follow_env.person.bodies import load_body
 from follow_env.reward import SET_POINT, reward_terms
-from follow_env.routes import ROUTES, Route, make_route
+from follow_env.routes import Route, choose_route, make_route
 from follow_env.vector.episode import CHEST_HEIGHT
 from follow_env.vector.kernels import BEGIN, SKIP, STEP, play
 from follow_env.vector.philox import keys
@@ -120,7 +120,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         chosen = self._mask(options.get("reset_mask"))
         self._seed(seed, chosen)
         if "route" in options:
-            self._worlds["route"][chosen] = ROUTE_NUMBERS[choose("route", options["route"], ROUTES)]
+            self._worlds["route"][chosen] = ROUTE_NUMBERS[choose_route(options["route"], self._single.scene)]
         if "robot_pose" in options:
             self._place_robots(options["robot_pose"], chosen)
         return self._begin(chosen)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -146,7 +147,8 @@ def load_agent(name: str | Path, scene: str = "corridor") -> Agent:
     """Return a shipped agent (`shipped()` names them) or that of a weights file.
 
     Raises:
-        ValueError: if there is no such agent, the file is damaged, or it was trained for another version.
+        ValueError: if there is no such agent, the file is damaged or not that of the card beside it, or it was trained
+            for another version.
     """
     from safetensors import SafetensorError, safe_open
 
@@ -160,8 +162,12 @@ def load_agent(name: str | Path, scene: str = "corridor") -> Agent:
             header = file.metadata() or {}
             arrays = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118 (not a mapping)
         card = Card(**json.loads(header["card"]))
+        beside = path.with_suffix(".json")
+        told = json.loads(beside.read_text(encoding="utf-8"))["weights_sha256"] if beside.is_file() else None
     except (SafetensorError, KeyError, TypeError, json.JSONDecodeError) as error:
         raise ValueError(f"{path} cannot be read as an agent ({error}); get the file again") from error
+    if told is not None and told != hashlib.sha256(path.read_bytes()).hexdigest():
+        raise ValueError(f"{path.name} is not the file that its card {beside.name} describes; get both again")
     if card.environment != ENVIRONMENT:
         raise ValueError(
             f"{path.name} was trained for {card.environment}, this is {ENVIRONMENT}; train it again with "

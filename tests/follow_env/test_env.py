@@ -241,6 +241,17 @@ def test_a_route_can_be_chosen_for_one_episode(make, episode):
     assert np.abs(track[:, 2]).max() > math.radians(19.0)
 
 
+@pytest.mark.parametrize("route", ["paper", "straight"])
+def test_a_route_that_is_too_long_for_the_scene_is_one_clear_error(make, route):
+    message = rf"the route '{route}' needs 12 m of free way, which the scene 'cabin' lacks; take route='standing' or an"
+    with pytest.raises(ValueError, match=message):
+        make(scene="cabin", route=route)
+    env = make(scene="cabin", route="standing")
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=message):
+        env.reset(options={"route": route})
+
+
 def test_the_robot_can_be_placed(make):
     env = make(INDOOR)
     for pose in ((0.0, 0.0, 0.0), (1.0, -0.5, 2.0), (-2.0, 0.7, -3.0)):

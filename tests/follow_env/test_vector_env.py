@@ -186,7 +186,7 @@ def test_statistics_of_episodes_are_recorded(make):
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"num_envs": 0}, "num_envs is 0"),
+        ({"num_envs": 0}, "num_envs is 0; expected a whole number from 1"),
         ({"num_envs": 2, "threads": 0}, "threads is 0"),
         ({"num_envs": 2, "autoreset_mode": "SameSteps"}, "did you mean 'SameStep'"),
         ({"num_envs": 2, "obs": "rgbd_box"}, "'rgbd_box' is not to be had in a batch"),
@@ -194,6 +194,7 @@ def test_statistics_of_episodes_are_recorded(make):
         ({"num_envs": 2, "render_mode": "rgb_array"}, "expected None in a batch"),
         ({"num_envs": 2, "robot": {"max_wheel_torque": 0.1}}, "knows no torque"),
         ({"num_envs": 2, "rout": "paper"}, "did you mean 'route'"),
+        ({"num_envs": 2, "scene": "cabin"}, "the route 'paper' needs 12 m of free way, which the scene 'cabin' lacks"),
     ],
 )
 def test_an_impossible_batch_is_refused_in_one_sentence(settings, message):
@@ -218,6 +219,14 @@ def test_impossible_calls_are_refused_in_one_sentence(make):
         env.reset(options={"robot_poses": (0, 0, 0)})
     with pytest.raises(ValueError, match="expected three finite numbers"):
         env.reset(options={"robot_pose": (0.0, np.nan, 0.0)})
+
+
+def test_a_route_that_is_too_long_for_the_scene_is_refused_for_one_episode_too():
+    env = gymnasium.make_vec(IDS["corridor"], num_envs=2, scene="cabin", route="standing")
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"'straight' .* the scene 'cabin' lacks; take route='standing'"):
+        env.reset(options={"route": "straight"})
+    env.close()
 
 
 def test_pictures_depend_on_the_worlds_seed_only_and_begin_anew_with_the_episode(make):

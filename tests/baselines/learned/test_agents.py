@@ -26,10 +26,11 @@ def rows() -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_every_recipe_ships_agents_and_ppo_five() -> None:
+def test_every_recipe_ships_two_agents_ppo_five_and_pictures_one() -> None:
     seeds = {name: sum(agent.rpartition("-")[0] == name for agent in AGENTS) for name in RECIPES}
-    assert seeds["ppo"] == 5
-    assert min(seeds.values()) >= 1
+    assert seeds.pop("ppo") == 5
+    assert seeds.pop("ppo_pixels") == 1
+    assert min(seeds.values()) >= 2
 
 
 @pytest.mark.parametrize("name", AGENTS)
@@ -83,6 +84,16 @@ def test_damaged_weights_are_refused(weights: Path) -> None:
         load_agent(weights)
 
 
+def test_weights_that_are_not_those_of_their_card_are_refused(weights: Path) -> None:
+    weights.with_suffix(".json").write_bytes(weights_file("ppo-0").with_suffix(".json").read_bytes())
+    load_agent(weights)
+    changed = bytearray(weights.read_bytes())
+    changed[-1] ^= 1
+    weights.write_bytes(changed)
+    with pytest.raises(ValueError, match=r"copy\.safetensors is not the file that its card copy\.json describes"):
+        load_agent(weights)
+
+
 def test_weights_of_something_else_are_refused(weights: Path) -> None:
     save_file({"layer": np.zeros(3, np.float32)}, weights)
     with pytest.raises(ValueError, match=r"copy\.safetensors cannot be read as an agent"):
@@ -103,12 +114,20 @@ def test_an_agent_of_another_version_is_refused(weights: Path) -> None:
         load_agent(weights)
 
 
-@pytest.mark.parametrize("obs", ["rgbd", "rgbd_uint8"])
-def test_another_observation_is_refused(obs: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "obs", "wanted"),
+    [
+        ("ppo-0", "rgbd", "measurement"),
+        ("recurrent_ppo-0", "rgbd_uint8", "measurement"),
+        ("ppo_pixels-0", "rgbd_box", "rgbd_uint8"),
+        ("ppo_pixels-0", "measurement", "rgbd_uint8"),
+    ],
+)
+def test_another_observation_is_refused(name: str, obs: str, wanted: str) -> None:
     env = FollowEnv("corridor", obs=obs, camera={"width": 32, "height": 24})
     observation, _ = env.reset(seed=0)
-    with pytest.raises(ValueError, match=r"agent ppo-0 got .*; it drives with obs='measurement'"):
-        load_agent("ppo-0").predict(observation)
+    with pytest.raises(ValueError, match=rf"agent {name} got .*; it drives with obs='{wanted}'"):
+        load_agent(name).predict(observation)
     env.close()
 
 

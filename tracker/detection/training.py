@@ -1,11 +1,13 @@
 """Training: pictures made while they are needed, one cosine cycle of AdamW, and an average of the weights to keep.
 
 A run writes `config.json`, `log.csv`, `evaluation.csv`, `curves.png`, `weights.safetensors` (the average, what
-`PersonDetector` reads) and `state.pt`, from which it goes on to the weights that it would have had without a break.
+`PersonDetector` reads) with their `card.json`, and `state.pt`, from which it goes on to the weights that it would have
+had without a break.
 """
 
 import csv
 import dataclasses
+import hashlib
 import json
 import math
 import time
@@ -23,12 +25,13 @@ from tracker.detection.data import DataConfig, SampleSource, without_augmentatio
 from tracker.detection.detector import network_input, to_tensor
 from tracker.detection.evaluation import Score, evaluate
 from tracker.detection.loss import Loss, multibox_loss
-from tracker.detection.networks import NETS, make_network
+from tracker.detection.networks import NETS, count_macs, count_parameters, make_network
 from tracker.detection.priors import match, prior_boxes
 from tracker.detection.weights import load_network, save_weights
 
 TEST_SEED = 1_000_000
 """Seed of the held-out pictures; training takes smaller ones."""
+COUNTED = ("tp", "fp", "fn")
 
 
 @dataclass(frozen=True)
@@ -101,7 +104,43 @@ def train(
         raise ValueError(f"{out} holds a run of other settings; repeat those of {record}, or name another folder")
     out.mkdir(parents=True, exist_ok=True)
     record.write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
-    return _Run(config, out, workers, tell).go()
+    score = _Run(config, out, workers, tell).go()
+    write_card(out)
+    return score
+
+
+def write_card(out: Path) -> None:
+    """Write `card.json` beside the weights of a run: what they are and how they came about.
+
+    Weights that the run started from are named by their SHA-256; if a card lies beside them, it becomes part of this.
+    """
+    settings = json.loads((out / "config.json").read_text(encoding="utf-8"))
+    with (out / "evaluation.csv").open(encoding="utf-8", newline="") as file:
+        *_, last = csv.DictReader(file)
+    start = None if settings["start"] is None else Path(settings["start"])
+    before = None
+    if start is not None:
+        card = start.with_name("card.json")
+        before = json.loads(card.read_text(encoding="utf-8")) if card.exists() else {"weights_sha256": _digest(start)}
+    network = make_network(settings["net"])
+    card_of_run = {
+        "net": settings["net"],
+        "weights_sha256": _digest(out / "weights.safetensors"),
+        "parameters": count_parameters(network),
+        "macs": count_macs(network),
+        "steps": int(last["step"]),
+        "pictures": int(last["step"]) * settings["batch"],
+        "training_s": float(last["seconds"]),
+        "torch": torch.__version__,
+        "held_out": {key: float(last[key]) if key == "ap" else int(last[key]) for key in ("pictures", "ap", *COUNTED)},
+        "settings": settings,
+        "started_from": before,
+    }
+    (out / "card.json").write_text(json.dumps(card_of_run, indent=1) + "\n", encoding="utf-8")
+
+
+def _digest(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
 class _Run:

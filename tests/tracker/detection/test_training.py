@@ -29,7 +29,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_folder_holds_what_is_needed_to_judge_and_to_use_the_run(finished: Path) -> None:
     assert {p.name for p in finished.iterdir()} == {
-        "config.json", "log.csv", "evaluation.csv", "curves.png", "weights.safetensors", "state.pt",
+        "config.json", "log.csv", "evaluation.csv", "curves.png", "weights.safetensors", "card.json", "state.pt",
     }  # fmt: skip
     with (finished / "log.csv").open() as file:
         assert [int(row["step"]) for row in csv.DictReader(file)] == [1, 2, 3, 4]

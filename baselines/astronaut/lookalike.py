@@ -1,12 +1,6 @@
 """Paper A's second experiment (Figures 17 and 18): a second person in the same clothes, and of the same body.
 
-An episode, drawn from its seed and from nothing else:
-
-1. the target is alone, moves gently at its place and is confirmed as the largest, most central person;
-2. the other one enters beside the camera, comes close to the target until they stand shoulder to shoulder, and passes
-   behind it to its other side or steps away and back: the tracker must stay with the target (Figure 17);
-3. the other one steps between camera and target and stays: the tracker must stop after a second, and never follow the
-   other person (Figure 18).
+`script` says what happens in an episode: a close pass (Figure 17), then an occlusion (Figure 18).
 
 **Right and wrong.** In a frame with an accepted measurement the tracker is wrong if its box overlaps the other person's
 true box more than the target's, and at nobody's if it overlaps neither. A switch is a wrong frame after a right one.
@@ -21,23 +15,19 @@ before the target out of the target's box, follows that depth inside the gate, a
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.random import Generator
-from scipy.stats import binomtest
 
-from baselines.astronaut.stage import CAMERA, PERIOD, PRINTED, SETTINGS, Picture, Watch, stage
+from baselines.astronaut.script import OTHER, TARGET, Cast, draw_script
+from baselines.astronaut.stage import PERIOD, PRINTED, SETTINGS, Picture, Watch, stage
 from baselines.benchmark.figures import picture
 from baselines.benchmark.files import Value
-from follow_env.camera.mesh import Placed
-from follow_env.person.bodies import BODIES, SUITS, Outfit, load_body
-from follow_env.person.walker import Walker
+from baselines.benchmark.statistics import share_interval
 from tracker.detection.boxes import Detection
 from tracker.metrics import overlap
 from tracker.person_tracker import Detector, Track
@@ -47,13 +37,6 @@ if TYPE_CHECKING:
 
 Row = dict[str, Value]
 
-TARGET, OTHER = 1, 2
-"""Ids of the two."""
-ADULTS = tuple(body for body in BODIES if body != "child")
-POSTURES = ("walk", "bent", "arms_raised")
-"""Of the target: standing or stepping about, bent over its work, arms raised."""
-REACH = 0.5
-"""So much farther a bent body reaches forward, m; the other one keeps clear of it, as nobody walks through anybody."""
 HALF = 0.5
 """Least share of the target's pixels that must be visible; with less it is hidden."""
 HIDDEN_TIME = SETTINGS.stop_time
@@ -87,56 +70,6 @@ takes its depth samples from the box whosoever they are."""
 
 _TRACKERS = {"ours": "", "printed": "printed_"}
 _GREEN, _VERMILION = "#009E73", "#D55E00"
-
-
-@dataclass(frozen=True)
-class Script:
-    """What an episode shows; lengths m, times s, angles rad.
-
-    Attributes:
-        suit, body, posture: Of the target; the other one wears the same suit and has the same body, but walks.
-        distance: Of the target from the camera.
-        left: Where the target is beside the line of sight.
-        heading: Of the target, and of the other one when it stands.
-        sway: Amplitude, period and phase of the target's movement forward and to the left.
-        gap: Between the two when close.
-        passes_behind: Whether the other one passes behind the target; else it steps away and back.
-        step_in: How far before the target the other one stays in the end.
-        keys: Of the other one's way: (time, how much farther than the target, how far to its left), as the camera
-            sees it. The last four: it leaves the target's side, is before it, has stepped in, and the episode ends.
-    """
-
-    suit: str
-    body: str
-    posture: str
-    distance: float
-    left: float
-    heading: float
-    sway: tuple[tuple[float, float, float], tuple[float, float, float]]
-    gap: float
-    passes_behind: bool
-    step_in: float
-    keys: tuple[tuple[float, float, float], ...]
-
-    @property
-    def step_in_time(self) -> float:
-        """When the other one leaves the target's side for the last time."""
-        return self.keys[-4][0]
-
-    def target(self, time: float) -> tuple[float, float]:
-        """Return where the target is, (forward, left) of the camera."""
-        forward, left = (size * math.sin(2.0 * math.pi * time / period + phase) for size, period, phase in self.sway)
-        return self.distance + forward, self.left + left
-
-    def other(self, time: float) -> tuple[float, float]:
-        """Return where the other one is, (forward, left) of the camera; it goes from key to key and rests at each."""
-        x, y = self.target(time)
-        range_ = math.hypot(x, y)
-        start, end = next((pair for pair in pairwise(self.keys) if time <= pair[1][0]), (self.keys[-1],) * 2)
-        share = min(max((time - start[0]) / max(end[0] - start[0], 1e-9), 0.0), 1.0)
-        share *= share * (3.0 - 2.0 * share)
-        farther, left = (a + share * (b - a) for a, b in zip(start[1:], end[1:], strict=True))
-        return x + (farther * x - left * y) / range_, y + (farther * y + left * x) / range_
 
 
 @dataclass(frozen=True)
@@ -210,7 +143,7 @@ def table(rows: Sequence[Mapping[str, Value]]) -> str:
         "`ours` takes no depth sample of somebody nearer, `printed` is the paper's to the letter. A switch is a frame "
         "in which another person's box is accepted after one in which the target's was. The target is hidden when "
         f"less than {100 * HALF:.0f} % of its pixels are visible for longer than {HIDDEN_TIME:g} s; times count from "
-        "then, in s. Exact (Clopper-Pearson) intervals. Share stopped: of the episodes in which the target was hidden.",
+        "then, in s. Intervals are Wilson's. Share stopped: of the episodes in which the target was hidden.",
     ]
     return "\n".join(lines) + "\n"
 
@@ -242,69 +175,16 @@ def draw(detector: Detector | None, path: Path) -> None:
 def film(seed: int, detector: Detector | None = None) -> Iterator[Frame]:
     """Yield the processed frames of an episode; the arguments are those of `play`."""
     script = draw_script(seed)
-    colour = SUITS[script.suit]
-    body = load_body(script.body, Outfit(shirt=colour, trousers=colour), "high")
-    target = _Mover(Walker(body, TARGET), script.posture, script.heading)
-    other = _Mover(Walker(body, OTHER), "walk", script.heading)
-    noise = np.random.default_rng((1, seed))
-    watches = (Watch(), Watch(PRINTED))
+    cast, noise, watches = Cast(script), np.random.default_rng((1, seed)), (Watch(), Watch(PRINTED))
     for frame in range(int(script.keys[-1][0] / PERIOD) + 1):
         time = frame * PERIOD
-        people = [target.go(script.target(time), turns=False)]
-        if time >= script.keys[0][0]:
-            people.append(other.go(script.other(time)))
-        shown = stage().take(people, int(noise.integers(1 << 63)))
+        shown = stage().take(cast.people(time), int(noise.integers(1 << 63)))
         found = shown.perfect_detections() if detector is None else detector.detect(shown.rgb, shown.depth)
         tracks = [watch.see(shown, found) for watch in watches]
         yield Frame(time, shown, found, *tracks)
         for watch, track in zip(watches, tracks, strict=True):
             if track.alarm and shown.shares[TARGET] >= WHOLE:
                 watch.tracker.confirm(shown.boxes[TARGET])
-
-
-def draw_script(seed: int) -> Script:
-    """Return what the episode of a seed shows.
-
-    Raises:
-        ValueError: If the seed is no whole number from 0.
-    """
-    if not isinstance(seed, int) or seed < 0:
-        raise ValueError(f"seed is {seed!r}; expected a whole number from 0")
-    rng = np.random.default_rng(seed)
-    posture = _choice(rng, POSTURES)
-    away = bool(rng.random() < 0.3)
-    reach = REACH if posture == "bent" else 0.0
-    turned = _between(rng, -0.6, 0.6) if posture != "bent" else _between(rng, -0.2, 0.2)
-    distance, gap, step_in = _between(rng, 2.2, 3.2), _between(rng, 0.5, 0.7), _between(rng, 0.7, 1.1)
-    step_in, behind = (step_in, 0.55 + reach) if away else (step_in + reach, 0.55)
-    side, passes_behind = -1.0 if rng.random() < 0.5 else 1.0, bool(rng.random() < 0.5)
-    if passes_behind:
-        leg = [(behind, side * gap), (behind, -side * gap), (0.0, -side * gap)]
-    else:
-        leg = [(0.0, side * (gap + 0.45)), (0.0, side * gap)]
-    stops = [
-        ((0.6 - distance, side * 1.1), 0.0),
-        ((0.0, side * (gap + 0.45)), 0.0),
-        ((0.0, side * gap), _between(rng, 1.0, 3.0)),
-        *((place, 0.0) for place in leg[:-1]),
-        (leg[-1], _between(rng, 0.5, 2.0)),
-        ((-step_in, leg[-1][1]), 0.0),
-        ((-step_in, _between(rng, -0.05, 0.05)), 3.0),
-    ]
-    keys = _timed(stops, _between(rng, 3.0, 4.0), _between(rng, 0.4, 0.9))
-    return Script(
-        suit=_choice(rng, tuple(SUITS)),
-        body=_choice(rng, ADULTS),
-        posture=posture,
-        distance=distance,
-        left=_between(rng, -0.25, 0.25),
-        heading=(0.0 if away else math.pi) + turned,
-        sway=(_sway(rng), _sway(rng)),
-        gap=gap,
-        passes_behind=passes_behind,
-        step_in=step_in,
-        keys=tuple(keys),
-    )
 
 
 def _table_line(perception: str, name: str, prefix: str, rows: Sequence[Mapping[str, Value]]) -> str:
@@ -314,7 +194,7 @@ def _table_line(perception: str, name: str, prefix: str, rows: Sequence[Mapping[
     switches, wrong = numbers(f"{prefix}switches"), numbers(f"{prefix}wrong_frames")
     hidden_switches = sum(numbers(f"{prefix}switches_hidden"))
     switched = sum(count > 0.0 for count in wrong)
-    low, high = binomtest(switched, len(rows)).proportion_ci(0.95, "exact")
+    low, high = share_interval(switched, len(rows))
     hidden = [row for row in rows if row["occlusion_start"] is not None]
     stopped = sum(row[f"{prefix}stop_time"] is not None and row[f"{prefix}wrong_frames"] == 0 for row in hidden)
     times = sorted(numbers(f"{prefix}stop_time"))
@@ -358,59 +238,6 @@ def _draw_frame(axes: Axes, frame: Frame) -> None:
     axes.set_yticks([])
     axes.grid(visible=False)
     axes.set_title(f"{frame.time:.1f} s: {frame.track.state}", fontsize=9)
-
-
-def _between(rng: Generator, low: float, high: float) -> float:
-    return float(rng.uniform(low, high))
-
-
-def _choice(rng: Generator, names: Sequence[str]) -> str:
-    return names[int(rng.integers(len(names)))]
-
-
-def _sway(rng: Generator) -> tuple[float, float, float]:
-    return _between(rng, 0.05, 0.20), _between(rng, 5.0, 9.0), _between(rng, 0.0, 2.0 * math.pi)
-
-
-def _timed(
-    stops: Iterable[tuple[tuple[float, float], float]], time: float, speed: float
-) -> Iterator[tuple[float, float, float]]:
-    """Yield the keys of a way through places at each of which one waits; `speed` is the highest, 1.5 times the mean."""
-    last = None
-    for place, wait in stops:
-        if last is not None:
-            time += 1.5 * math.dist(last, place) / speed
-        yield time, *place
-        if wait > 0.0:
-            time += wait
-            yield time, *place
-        last = place
-
-
-class _Mover:
-    """Moves a walker from place to place: its gait is that of its speed, it turns into its way and back at rest."""
-
-    TURN = 3.0 * PERIOD
-    MOVING = 0.2
-
-    def __init__(self, walker: Walker, posture: str, heading: float) -> None:
-        self._walker, self._posture, self._rest = walker, posture, heading
-        self._heading, self._walked = heading, 0.0
-        self._place: tuple[float, float] | None = None
-
-    def go(self, place: tuple[float, float], turns: bool = True) -> Placed:
-        """Return the person at the next frame's place, (forward, left) of the camera."""
-        x, y = self._place or place
-        step = math.dist((x, y), place)
-        goal = self._rest
-        if turns and step > self.MOVING * PERIOD:
-            goal = math.atan2(place[1] - y, place[0] - x)
-        off = math.remainder(goal - self._heading, 2.0 * math.pi)
-        self._heading += min(max(off, -self.TURN), self.TURN)
-        self._walked += step
-        self._place = place
-        where = CAMERA.x + place[0], CAMERA.y + place[1]
-        return self._walker.place(*where, self._heading, self._walked, step / PERIOD, self._posture)
 
 
 @dataclass(frozen=True)

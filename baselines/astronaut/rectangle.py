@@ -35,7 +35,7 @@ from baselines.astronaut.stage import CAMERA, PERIOD, SETTINGS, Picture, Watch, 
 from baselines.benchmark.figures import picture
 from baselines.benchmark.files import Value
 from follow_env.config import choose
-from follow_env.person.bodies import SUITS, Outfit, load_body
+from follow_env.person.bodies import SUITS, load_body
 from follow_env.person.walker import Walker
 from tracker.detection.boxes import Detection
 from tracker.person_tracker import Detector, Track
@@ -88,8 +88,7 @@ def play(posture: str, detector: Detector | None = None) -> Walk:
     """
     choose("posture", posture, POSTURES)
     perception = "mask" if detector is None else "detector"
-    colour = SUITS["blue"]
-    walker = Walker(load_body("man", Outfit(shirt=colour, trousers=colour), "high"))
+    walker = Walker(load_body("man", SUITS["blue"], "high"))
     ahead, left = _middle(walker, posture)
     noise = np.random.default_rng((0, POSTURES.index(posture)))
     watches = {run: Watch() for run in RUNS}

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from baselines.astronaut import lookalike, rectangle, stage, table2
+from baselines.astronaut import lookalike, rectangle, script, stage, table2
 from baselines.astronaut.experiments import EPISODES, EXPERIMENTS, Detectors, Part, Player, Rows, tasks
 from baselines.astronaut.table2 import OURS, SSD
 from baselines.benchmark import configuration
@@ -20,7 +20,7 @@ from tracker.detection.detector import CONFIDENCE
 
 FIGURES = "figures"
 _DIGITS = 6
-_CODE = (lookalike, rectangle, stage, table2)
+_CODE = (lookalike, rectangle, script, stage, table2)
 """Modules of this package on which the rows depend."""
 
 

@@ -18,7 +18,7 @@ from follow_env.camera.mesh import Placed
 from follow_env.camera.pinhole import CameraPose, PinholeCamera
 from follow_env.camera.raster import RasterRenderer
 from follow_env.camera.sensor import RGBDSensor
-from follow_env.config import SENSORS, CameraConfig
+from follow_env.config import CameraConfig, SensorConfig
 from follow_env.scenes import make_scene
 from tracker.detection.boxes import Detection
 from tracker.geometry import XTION_PRO
@@ -63,7 +63,7 @@ class Stage:
     """The cabin, the camera in it and the sensor's errors. What was drawn before changes nothing."""
 
     def __init__(self) -> None:
-        cabin, camera, sensor = make_scene("cabin"), PinholeCamera(CameraConfig()), SENSORS["xtion"]
+        cabin, camera, sensor = make_scene("cabin"), PinholeCamera(CameraConfig()), SensorConfig()
         self._renderer = RasterRenderer(cabin, camera)
         self._empty = dataclasses.replace(cabin, primitives=())
         self._camera = camera
@@ -75,13 +75,11 @@ class Stage:
         frame = self._renderer.render(CAMERA, people)
         boxes, shares = {}, {}
         for person in people:
-            mask = frame.ids == person.id
-            seen = int(np.count_nonzero(mask))
+            box = frame.person_box(id=person.id)
             shares[person.id] = 0.0
-            if seen:
-                rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-                left, top, right, bottom = columns[0], rows[0], columns[-1] + 1, rows[-1] + 1
-                boxes[person.id] = (float(left), float(top), float(right), float(bottom))
+            if box is not None:
+                boxes[person.id] = box
+                seen = int(np.count_nonzero(frame.ids == person.id))
                 shares[person.id] = seen / max(seen, self._pixels_alone(person))
         reported = self._sensor.corrupt(frame, noise)
         return Picture(reported.rgb, reported.depth, boxes, shares)

@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -232,6 +233,15 @@ def weighted_share(rows: Sequence[Row], column: str, weights: Sequence[float] | 
             pairs.append((float(value), float(weight)))
     total = math.fsum(weight for _, weight in pairs)
     return math.fsum(value * weight for value, weight in pairs) / total if total > 0.0 else None
+
+
+def share_interval(count: int, total: int) -> Interval:
+    """95 % interval of the share of `count` in `total` episodes (Wilson 1927), within [0, 1]."""
+    z = NormalDist().inv_cdf(0.5 + 0.5 * CONFIDENCE)
+    share, shrunk = count / total, 1.0 + z * z / total
+    middle = (share + 0.5 * z * z / total) / shrunk
+    half = z * math.sqrt(share * (1.0 - share) / total + (0.5 * z / total) ** 2) / shrunk
+    return max(middle - half, 0.0), min(middle + half, 1.0)
 
 
 @lru_cache(maxsize=4)

@@ -19,9 +19,9 @@ class RGBDFrame:
     depth: np.ndarray
     ids: np.ndarray
 
-    def person_box(self, min_pixels: int = 1) -> tuple[float, float, float, float] | None:
-        """Return the tight box (u0, v0, u1, v1) of the person's visible pixels, in px; None below `min_pixels`."""
-        mask = self.ids == 1
+    def person_box(self, min_pixels: int = 1, id: int = 1) -> tuple[float, float, float, float] | None:
+        """Return the tight box (u0, v0, u1, v1) of a person's visible pixels, in px; None below `min_pixels`."""
+        mask = self.ids == id
         if np.count_nonzero(mask) < max(min_pixels, 1):
             return None
         width, flat = mask.shape[1], mask.reshape(-1)

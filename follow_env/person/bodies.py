@@ -58,8 +58,15 @@ OUTFITS: dict[str, Outfit] = {
     "grey": Outfit((0.50, 0.33, 0.23), (0.10, 0.07, 0.05), (0.45, 0.47, 0.50), (0.30, 0.31, 0.34)),
 }
 """Outfits by name."""
-SUITS: dict[str, Colour] = {"green": (0.16, 0.48, 0.28), "blue": (0.13, 0.33, 0.70), "indigo": (0.18, 0.16, 0.42)}
-"""Colours of suits, shirt and trousers alike: paper A's three spacesuits."""
+SUITS: dict[str, Outfit] = {
+    name: Outfit(shirt=colour, trousers=colour)
+    for name, colour in {
+        "green": (0.16, 0.48, 0.28),
+        "blue": (0.13, 0.33, 0.70),
+        "indigo": (0.18, 0.16, 0.42),
+    }.items()
+}
+"""Paper A's three spacesuits: shirt and trousers of one colour."""
 
 
 @dataclass(frozen=True)

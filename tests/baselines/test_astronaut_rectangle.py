@@ -6,12 +6,18 @@ from itertools import pairwise
 import pytest
 
 from baselines.astronaut import rectangle
+from baselines.astronaut.experiments import Part, Player, Rows
 from baselines.astronaut.rectangle import COLUMNS, CORNERS, GAP_FRAMES, GAPS, RUNS, play, table
 
 
 @pytest.fixture(scope="module")
-def walk():
-    return play("walk").rows
+def played():
+    return Player({})(Part("rectangle", "mask/walk"), 0)
+
+
+@pytest.fixture(scope="module")
+def walk(played):
+    return played.rows
 
 
 def places(rows, name):
@@ -62,7 +68,7 @@ def test_gaps_of_five_frames_are_coasted_over_and_the_track_holds(walk):
 def test_the_table_has_a_row_for_each_position_and_gap(walk):
     lines = table(walk).splitlines()
 
-    assert set(walk[0]) == set(COLUMNS)
+    assert {tuple(row) for row in walk} == {COLUMNS}
     assert {row["run"] for row in walk} == set(RUNS)
     assert sum(line.startswith("| mask | walk | measured | 19") for line in lines) == 1
     assert sum(line.startswith("| mask | walk | estimated | 19") for line in lines) == 1
@@ -71,7 +77,13 @@ def test_the_table_has_a_row_for_each_position_and_gap(walk):
         assert line.endswith("| yes |")
 
 
-def test_a_detector_that_sees_nobody_is_reported_as_such():
+def test_the_store_can_hold_the_rows(played):
+    assert Rows.unpack(*played.pack()) == played
+
+
+def test_a_detector_that_sees_nobody_is_reported_as_such(monkeypatch):
+    monkeypatch.setattr(rectangle, "SPEED", 1.6)  # a quarter of the frames
+
     class Blind:
         def detect(self, rgb, depth):
             return []

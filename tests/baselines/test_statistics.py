@@ -7,7 +7,7 @@ import pytest
 import scipy.stats
 
 from baselines.benchmark.metrics import Row
-from baselines.benchmark.statistics import NEGLIGIBLE, Difference, PooledError, weighted_share
+from baselines.benchmark.statistics import NEGLIGIBLE, Difference, PooledError, share_interval, weighted_share
 
 
 def row(errors: np.ndarray, seed: int = 0) -> Row:
@@ -161,3 +161,9 @@ def test_shares_are_weighted_by_steps_and_skip_what_does_not_apply() -> None:
     assert weighted_share(rows, "share") == pytest.approx(0.325)
     assert weighted_share(rows, "share", [1.0, 1.0, 1.0]) == pytest.approx(0.25)
     assert weighted_share(rows[2:], "share") is None
+
+
+@pytest.mark.parametrize(("count", "total"), [(0, 1), (0, 200), (1, 3), (7, 20), (200, 200)])
+def test_the_interval_of_a_share_agrees_with_scipy(count: int, total: int) -> None:
+    expected = scipy.stats.binomtest(count, total).proportion_ci(0.95, "wilson")
+    assert share_interval(count, total) == pytest.approx(tuple(expected), abs=1e-12)

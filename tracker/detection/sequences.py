@@ -11,7 +11,7 @@ from follow_env.camera import CameraPose, PinholeCamera, RGBDFrame
 from follow_env.camera.raster import RasterRenderer
 from follow_env.camera.sensor import RGBDSensor
 from follow_env.config import CameraConfig, SensorConfig
-from follow_env.person.bodies import SUITS, Outfit, load_body
+from follow_env.person.bodies import SUITS, load_body
 from follow_env.person.walker import POSTURES, Walker
 from follow_env.scenes import make_scene
 from tracker.metrics import DetectionCounts, count_detections
@@ -66,8 +66,7 @@ def play(sequence: Sequence, frames: Iterable[int] | None = None) -> Iterator[RG
     camera = PinholeCamera(CameraConfig())
     renderer, config = RasterRenderer(make_scene(SCENE), camera), SensorConfig()
     sensor = RGBDSensor(config.depth, config.colour, camera)
-    colour = SUITS[sequence.suit]
-    walker = Walker(load_body("man", Outfit(shirt=colour, trousers=colour), "high"))
+    walker = Walker(load_body("man", SUITS[sequence.suit], "high"))
     for frame in range(sequence.frames) if frames is None else frames:
         share = math.fmod(frame * len(POSTURES) / sequence.frames, 1.0)
         heading, posture = 2.0 * math.pi * TURNS * share, sequence.posture(frame)

@@ -103,7 +103,7 @@ def _table2_show(rows: Sequence[Row], detectors: Detectors, picture: Path) -> st
     table2.draw(detectors[OURS], picture)
     return (
         f"{table2.table(table2.records(rows))}\n\n"
-        "Both nets saw the same pictures. The paper's subjects, cabin and weights are not public: its figures are no "
+        "All nets saw the same pictures. The paper's subjects, cabin and weights are not public: its figures are no "
         "target;\nwhat can be compared is which net misses less.\n\n"
         "### By posture\n\nAll sequences together; the paper could not test the headstand.\n\n"
         f"{table2.by_posture(rows)}"

@@ -6,13 +6,15 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from baselines.astronaut.table2 import NETS
+from baselines.astronaut.table2 import NETS, OURS
 from follow_env.config import choose
-from tracker.detection.detector import PersonDetector, shipped_weights
+from tracker.detection.detector import SHIPPED, PersonDetector, shipped_weights
 
 
 class Nets(Mapping[str, PersonDetector]):
     """The trained detectors by name, each loaded when first asked for; a worker process gets them unloaded.
+
+    Ours has to be there; one that it is compared with is left out where it has no weights.
 
     Args:
         weights: Files that replace the shipped ones, by net.
@@ -25,9 +27,11 @@ class Nets(Mapping[str, PersonDetector]):
     def __init__(self, weights: Mapping[str, Path]) -> None:
         for net in weights:
             choose("net", net, NETS)
-        self._files = {net: weights.get(net) or shipped_weights(net) for net in NETS}
+        files = {net: weights.get(net) or SHIPPED / f"{net}.safetensors" for net in NETS}
+        self._files = {net: file for net, file in files.items() if net in weights or file.is_file()}
+        self._files.setdefault(OURS, weights.get(OURS) or shipped_weights(OURS))
         self._loaded: dict[str, PersonDetector] = {}
-        for net in NETS:
+        for net in self:
             self[net]
 
     def __getitem__(self, net: str) -> PersonDetector:
@@ -37,10 +41,10 @@ class Nets(Mapping[str, PersonDetector]):
         return self._loaded[net]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(NETS)
+        return iter(self._files)
 
     def __len__(self) -> int:
-        return len(NETS)
+        return len(self._files)
 
     def __getstate__(self) -> dict[str, object]:
         return {"_files": self._files, "_loaded": {}}

@@ -57,6 +57,8 @@ def detect(film: Film, part: int, detectors: Mapping[str, Detector]) -> list[Row
         row: dict[str, Value] = {"suit": film.suit, "view": film.view, "frame": number, "posture": film.posture(number)}
         row["truth"] = None if box is None else " ".join(f"{edge:.0f}" for edge in box)
         for net in NETS:
+            row[net] = None
+        for net in detectors:
             found = detectors[net].detect(shown.rgb, shown.depth)
             row[net] = ";".join(" ".join([*(f"{e:.1f}" for e in one.box), f"{one.score:.3f}"]) for one in found)
         rows.append(row)
@@ -71,11 +73,11 @@ def records(rows: Iterable[Row]) -> list[dict[str, Value]]:
     """
     found: list[dict[str, Value]] = []
     sequences = _grouped(rows, lambda row: (str(row["suit"]), int(str(row["view"]))))
-    totals: dict[str, list[tuple[DetectionCounts, DetectionCounts]]] = {net: [] for net in NETS}
+    totals: dict[str, list[tuple[DetectionCounts, DetectionCounts]]] = {}
     for (suit, view), group in sequences.items():
-        for net in NETS:
+        for net in _nets(group):
             counts, paper = _count(group, net), PAPER[suit, view][net]
-            totals[net].append((counts, paper))
+            totals.setdefault(net, []).append((counts, paper))
             found.append({"suit": suit, "view": view, "net": net, **_fields(counts, paper)})
     for net, pairs in totals.items():
         counts, paper = (_total([pair[k] for pair in pairs]) for k in (0, 1))
@@ -102,13 +104,14 @@ def table(found: Sequence[Row]) -> str:
 
 def by_posture(rows: Iterable[Row]) -> str:
     """Return a Markdown table of the TDA of each net in each posture, all sequences together."""
-    lines = []
+    rows = list(rows)
+    nets, lines = _nets(rows), []
     for posture, group in _grouped(rows, lambda row: str(row["posture"])).items():
-        counts = [_count(group, net) for net in NETS]
+        counts = [_count(group, net) for net in nets]
         lines.append(
             [posture.replace("_", " "), str(counts[0].frames), *(f"{100.0 * one.tda:.2f} %" for one in counts)]
         )
-    return markdown_table(["posture", "frames", *(f"TDA of {net}" for net in NETS)], lines, left=1)
+    return markdown_table(["posture", "frames", *(f"TDA of {net}" for net in nets)], lines, left=1)
 
 
 def draw(detector: Detector, path: Path) -> None:
@@ -140,6 +143,11 @@ def _grouped(rows: Iterable[Row], key: Callable[[Row], object]) -> dict:
     for row in rows:
         groups.setdefault(key(row), []).append(row)
     return groups
+
+
+def _nets(rows: Sequence[Row]) -> list[str]:
+    """Return the nets that saw the frames: a net that found nobody has an empty text, one that was not there none."""
+    return [net for net in NETS if rows[0][net] is not None]
 
 
 def _count(rows: Sequence[Row], net: str) -> DetectionCounts:

@@ -19,7 +19,7 @@ from baselines.benchmark.report import markdown_table
 from baselines.speed.timing import Cost, measure
 from follow_env.camera import RGBDFrame
 from tracker.detection.detector import PersonDetector, network_input, predict
-from tracker.detection.networks import count_macs, make_network
+from tracker.detection.networks import MultiBoxNet, count_macs, make_network
 from tracker.detection.sequences import Sequence as Film
 from tracker.detection.sequences import play
 from tracker.geometry import XTION_PRO
@@ -52,7 +52,7 @@ class Speed:
         macs: Multiplications in the network's convolutions.
         frames: How many were timed.
         cost: Of one, on one thread.
-        ssd_cost: The same of the SSD on the same trunk, in the same run.
+        ssd_cost: The same of the SSD on the same trunk, in the same run; None without its weights.
     """
 
     net: str
@@ -61,7 +61,7 @@ class Speed:
     macs: int
     frames: int
     cost: Cost
-    ssd_cost: Cost
+    ssd_cost: Cost | None
 
 
 def measure_speeds(detectors: Mapping[str, PersonDetector], repeats: int = REPEATS) -> list[Speed]:
@@ -74,16 +74,16 @@ def measure_speeds(detectors: Mapping[str, PersonDetector], repeats: int = REPEA
     frames = list(play(Film("blue", 1, 8 * _PICTURES), range(_PICTURES)))
     pictures = [network_input(frame.rgb, None) for frame in frames]
     operations: dict[tuple[str, str], Callable[[], object]] = {}
-    for net in NETS:
-        operations[net, "network"] = _forward(detectors[net].network, pictures)
-        operations[net, "detector"] = _detecting(detectors[net], frames)
-        operations[net, "tracker"] = _tracking(detectors[net], frames)
-    macs = {net: count_macs(detectors[net].network) for net in NETS}
-    speeds = _speeds(operations, macs, repeats, trained=True, ssd=SSD)
-    full = {net: make_network(net).eval() for net in FULL.values()}
-    operations = {(net, "network"): _forward(network, pictures) for net, network in full.items()}
-    macs = {net: count_macs(network) for net, network in full.items()}
-    return speeds + _speeds(operations, macs, min(repeats, FULL_REPEATS), trained=False, ssd=FULL[SSD])
+    networks = {net: detectors[net].network if net in detectors else make_network(net).eval() for net in NETS}
+    for net, network in networks.items():
+        operations[net, "network"] = _forward(network, pictures)
+        if net in detectors:
+            operations[net, "detector"] = _detecting(detectors[net], frames)
+            operations[net, "tracker"] = _tracking(detectors[net], frames)
+    speeds = _speeds(operations, networks, repeats, detectors, ssd=SSD)
+    networks = {net: make_network(net).eval() for net in FULL.values()}
+    operations = {(net, "network"): _forward(network, pictures) for net, network in networks.items()}
+    return speeds + _speeds(operations, networks, min(repeats, FULL_REPEATS), detectors, ssd=FULL[SSD])
 
 
 def write(speeds: Sequence[Speed], done: str, folder: Path) -> None:
@@ -105,7 +105,7 @@ def write(speeds: Sequence[Speed], done: str, folder: Path) -> None:
             "fastest_s": speed.cost.fastest,
             "cpu_median_s": speed.cost.cpu_median,
             "frames_per_s": 1.0 / speed.cost.median,
-            "of_ssd": speed.ssd_cost.median / speed.cost.median,
+            "of_ssd": None if speed.ssd_cost is None else speed.ssd_cost.median / speed.cost.median,
         }
         for speed in speeds
     ]
@@ -121,12 +121,14 @@ def table(speeds: Sequence[Speed]) -> str:
     for speed in speeds:
         cost, ssd = speed.cost, speed.ssd_cost
         times = [f"{1e3 * value:.1f}" for value in (cost.median, cost.fastest, cost.cpu_median)]
-        ratios = [f"{ssd.median / cost.median:.2f} x", f"{ssd.cpu_median / cost.cpu_median:.2f} x"]
+        ratios = ["–", "–"]
+        if ssd is not None and ssd is not cost:
+            ratios = [f"{ssd.median / cost.median:.2f} x", f"{ssd.cpu_median / cost.cpu_median:.2f} x"]
         net = speed.net if speed.trained else f"{speed.net} (untrained)"
         lines.append(
             [
                 *(net, STAGES[speed.stage], f"{speed.macs / 1e9:.2f}", str(speed.frames), *times),
-                *(f"{1.0 / cost.median:.1f}", *(("–", "–") if cost is ssd else ratios)),
+                *(f"{1.0 / cost.median:.1f}", *ratios),
             ]
         )
     return (
@@ -140,14 +142,15 @@ def table(speeds: Sequence[Speed]) -> str:
 
 def _speeds(
     operations: Mapping[tuple[str, str], Callable[[], object]],
-    macs: Mapping[str, int],
+    networks: Mapping[str, MultiBoxNet],
     repeats: int,
-    trained: bool,
+    detectors: Mapping[str, PersonDetector],
     ssd: str,
 ) -> list[Speed]:
+    macs = {net: count_macs(network) for net, network in networks.items()}
     costs = measure({f"{net} {stage}": operation for (net, stage), operation in operations.items()}, repeats)
     return [
-        Speed(net, trained, stage, macs[net], repeats, costs[f"{net} {stage}"], costs[f"{ssd} {stage}"])
+        Speed(net, net in detectors, stage, macs[net], repeats, costs[f"{net} {stage}"], costs.get(f"{ssd} {stage}"))
         for net, stage in operations
     ]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from baselines.astronaut.table2 import NETS, OURS
 from follow_env.config import choose
-from tracker.detection.detector import SHIPPED, PersonDetector, shipped_weights
+from tracker.detection.detector import PersonDetector, shipped_weights
 
 
 class Nets(Mapping[str, PersonDetector]):
@@ -27,9 +27,13 @@ class Nets(Mapping[str, PersonDetector]):
     def __init__(self, weights: Mapping[str, Path]) -> None:
         for net in weights:
             choose("net", net, NETS)
-        files = {net: weights.get(net) or SHIPPED / f"{net}.safetensors" for net in NETS}
-        self._files = {net: file for net, file in files.items() if net in weights or file.is_file()}
-        self._files.setdefault(OURS, weights.get(OURS) or shipped_weights(OURS))
+        self._files: dict[str, Path] = {}
+        for net in NETS:
+            try:
+                self._files[net] = weights.get(net) or shipped_weights(net)
+            except FileNotFoundError:
+                if net == OURS:
+                    raise
         self._loaded: dict[str, PersonDetector] = {}
         for net in self:
             self[net]

@@ -164,7 +164,7 @@ def test_speeds_are_beside_each_other_and_beside_the_ssds(tmp_path: Path, monkey
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ([], "no weights are shipped for the net 'light_ssd'"),
+        ([], "no weights are shipped for the net 'light'"),
         (["--weights", "light_ssd=nowhere", "--weights", "light=nowhere"], "the weights 'nowhere' do not exist"),
         (["--weights", "paper=some.safetensors"], "net 'paper' is not known"),
         (["--weights", "light"], "'light' names no file; expected NET=FILE"),

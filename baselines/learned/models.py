@@ -54,6 +54,7 @@ def make_model(recipe: Recipe, worlds: VecEnv, seed: int, log_dir: str | None = 
     assert isinstance(recipe, PPORecipe)
     layers = [recipe.hidden] * (1 if pixels else 2)
     policy |= {"net_arch": {"pi": layers, "vf": layers}, "log_std_init": recipe.initial_log_std}
+    policy |= {"activation_fn": nn.ReLU if pixels else nn.Tanh}  # a thousand unscaled features would saturate tanh
     if isinstance(recipe, RecurrentPPORecipe):
         policy |= {"lstm_hidden_size": recipe.memory}
     algorithm, name = (RecurrentPPO, "MlpLstmPolicy") if isinstance(recipe, RecurrentPPORecipe) else (PPO, "MlpPolicy")
@@ -101,7 +102,7 @@ def policy_arrays(model: BaseAlgorithm) -> tuple[dict[str, np.ndarray], str, boo
     for i, layer in enumerate(dense):
         arrays |= {f"dense.{i}.weight": layer.weight, f"dense.{i}.bias": layer.bias}
     plain = {name: tensor.detach().cpu().numpy().astype(np.float32) for name, tensor in arrays.items()}
-    return plain, "relu" if squash else "tanh", squash
+    return plain, "relu" if squash or isinstance(extractor, Picture) else "tanh", squash
 
 
 class Scaled(BaseFeaturesExtractor):

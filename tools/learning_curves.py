@@ -18,7 +18,7 @@ from baselines.learned.training import read_curve
 
 PANELS = (
     ("distance_tracking_rmse_m", "distance RMSE (cm)", 100.0, (1.0, 1000.0)),
-    ("angle_tracking_rmse_rad", "bearing RMSE (mrad)", 1000.0, (10.0, 1000.0)),
+    ("angle_tracking_rmse_rad", "bearing RMSE (mrad)", 1000.0, (10.0, 200.0)),
 )
 LOOKS = {
     "ppo": ("#0072B2", "o"),

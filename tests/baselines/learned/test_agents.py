@@ -26,10 +26,9 @@ def rows() -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_every_recipe_ships_two_agents_ppo_five_and_pictures_one() -> None:
+def test_every_recipe_ships_two_agents_and_ppo_five() -> None:
     seeds = {name: sum(agent.rpartition("-")[0] == name for agent in AGENTS) for name in RECIPES}
     assert seeds.pop("ppo") == 5
-    assert seeds.pop("ppo_pixels") == 1
     assert min(seeds.values()) >= 2
 
 

@@ -101,6 +101,6 @@ def _write(plan: Mapping[str, Sequence[tuple[Part, int]]], store: Store, detecto
 _HEAD = f"""# Paper A's experiments, reproduced
 
 In the cabin scene, with rendered people and the Xtion's errors in colour and depth. `{OURS}` has the paper's shared
-features and 2252 priors, `{SSD}` SSD's 8732 priors without them; both have the same light trunk in the place of VGG-16
-and were trained alike on rendered pictures. Boxes: `mask` are the true ones, `detector` those of `{OURS}`. Speed is in
+features and 2252 priors, `{SSD}` SSD's 8732 priors without them; both have the same light trunk in the place of VGG-16.
+A net without weights is left out. Boxes: `mask` are the true ones, `detector` those of `{OURS}`. Speed is in
 `timing.md`."""

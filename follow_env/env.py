@@ -25,7 +25,7 @@ from follow_env.reward import (
     SUCCESS_OUT_OF_VIEW,
     reward_terms,
 )
-from follow_env.routes import Route, choose_route, make_route
+from follow_env.routes import PAPER_SPEED, Route, check_walking_speed, choose_route, make_route
 from follow_env.scenes import make_scene
 from follow_env.view import Dashboard, import_pygame, show_window
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 ACTIONS = ("twist", "wheels")
 SETTINGS = (
     *("scene", "obs", "action", "route", "sensor", "camera", "robot", "renderer", "light", "control_hz", "latency_s"),
-    *("person", "outfit", "render_mode"),
+    *("person", "outfit", "walking_speed", "render_mode"),
 )
 LOST_AFTER = 5.0
 """The episode ends when the person was out of view for longer than this, s."""
@@ -88,6 +88,8 @@ class FollowEnv(gymnasium.Env):
         latency_s: age of what is observed, s; a multiple of the control period.
         person: body of the person, one of `follow_env.person.bodies.BODIES`.
         outfit: what the person wears, a key of `follow_env.person.bodies.OUTFITS`.
+        walking_speed: of the person between starting and stopping, m/s, from 0.2 to 2. The path stays; its times, the
+            14 s of the episode among them, stretch by 0.923 m/s over the speed.
         render_mode: None, `"rgb_array"` (dashboard), `"rgbd_tuple"` ((rgb, depth) of the robot) or `"human"`.
 
     Raises:
@@ -111,6 +113,7 @@ class FollowEnv(gymnasium.Env):
         latency_s: float = 0.0,
         person: str = "man",
         outfit: str = "blue",
+        walking_speed: float = PAPER_SPEED,
         render_mode: str | None = None,
         **unknown: Any,
     ) -> None:
@@ -145,6 +148,7 @@ class FollowEnv(gymnasium.Env):
         self._sensor = sensor_config(sensor)
         self.scene = make_scene(scene, light)
         self._route_name = choose_route(route, self.scene)
+        self._walking_speed = check_walking_speed(walking_speed)
         self._world: World | None = None
         self._renderer: Renderer | None = None
         self._dashboard: Dashboard | None = None
@@ -161,13 +165,13 @@ class FollowEnv(gymnasium.Env):
 
         Args:
             seed: seeds the environment's generator; one seed gives one episode, bit for bit.
-            options: `route` (name), `robot_pose` ((x, y, yaw), m and rad), `person` (body), `outfit`, `sensor`: for
-                this episode only.
+            options: `route` (name), `robot_pose` ((x, y, yaw), m and rad), `person` (body), `outfit`, `sensor`,
+                `walking_speed` (m/s): for this episode only.
         """
         super().reset(seed=seed)
         options = options or {}
         for key in options:
-            choose("reset option", key, ("route", "robot_pose", "person", "outfit", "sensor"))
+            choose("reset option", key, ("route", "robot_pose", "person", "outfit", "sensor", "walking_speed"))
         if self._world is None:
             self._world = World(self.scene, self.robot_config)
         self._set_up_sensors(sensor_config(options["sensor"]) if "sensor" in options else self._sensor)
@@ -183,7 +187,8 @@ class FollowEnv(gymnasium.Env):
         y += float(self.np_random.uniform(-1.0, 1.0)) * self.scene.start_width
         ahead = (x + SET_POINT * math.cos(yaw), y + SET_POINT * math.sin(yaw), yaw)
         route = choose_route(options["route"], self.scene) if "route" in options else self._route_name
-        self._route = make_route(route, self.scene, ahead, self.np_random)
+        speed = check_walking_speed(options.get("walking_speed", self._walking_speed))
+        self._route = make_route(route, self.scene, ahead, self.np_random, speed)
         robot_pose = _pose(options.get("robot_pose", (x, y, yaw)))
         self._steps = 0
         self._person_pose = self._route.pose(self.time)

@@ -6,6 +6,7 @@ not depend on the control rate.
 """
 
 import math
+import numbers
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,6 +29,12 @@ CORNER_CUT = 0.15
 
 SMALLEST_TURN, LARGEST_TURN = math.radians(20.0), math.radians(50.0)
 """Paper B's limits on a turn; the larger one also on the heading against the start, rad."""
+
+PAPER_SPEED = 12.0 / 13.0
+"""Walking speed of paper B's routes between starting and stopping, m/s: 12 m in 14 s with ramps of 1 s."""
+
+SLOWEST, FASTEST = 0.2, 2.0
+"""Walking speeds that a route can have, m/s: a shuffle and a jog."""
 
 OUTLINE = np.arange(0.0, 12.0, 0.4)
 """Where an outline is sampled, m of the way."""
@@ -97,6 +104,17 @@ class Route:
         for turn in self.turns:
             heading += turn.turned(t)
         return heading
+
+    def at_speed(self, speed: float) -> "Route":
+        """Return the same path walked at another speed (m/s, between the ramps): all its times stretch by one factor.
+
+        Standing still stays as it is.
+        """
+        stretch = self._cruise / speed
+        if stretch in (0.0, 1.0):
+            return self
+        turns = tuple(Turn(stretch * turn.start, stretch * turn.duration, turn.angle) for turn in self.turns)
+        return Route(self.start, self.distance, stretch * self.duration, stretch * self._ramp, turns)
 
     def velocity(self, t: float) -> tuple[float, float]:
         """Velocity at time t in the world frame, m/s."""
@@ -236,6 +254,22 @@ def choose_route(name: str, scene: Scene) -> str:
     return name
 
 
-def make_route(name: str, scene: Scene, start: tuple[float, float, float], rng: np.random.Generator) -> Route:
-    """Return the route `name` from `start`; a ValueError names the nearest when there is none."""
-    return ROUTES[choose("route", name, ROUTES)](scene, start, rng)
+def check_walking_speed(speed: float) -> float:
+    """Return the speed, m/s; a ValueError says what is expected."""
+    if not (isinstance(speed, numbers.Real) and SLOWEST <= speed <= FASTEST):
+        raise ValueError(f"walking_speed is {speed!r}; expected m/s from {SLOWEST} to {FASTEST}")
+    return float(speed)
+
+
+def make_route(
+    name: str,
+    scene: Scene,
+    start: tuple[float, float, float],
+    rng: np.random.Generator,
+    walking_speed: float = PAPER_SPEED,
+) -> Route:
+    """Return the route `name` from `start`, walked at a speed (m/s); a ValueError names the nearest if there is none.
+
+    The draws, and with them the path, do not depend on the speed.
+    """
+    return ROUTES[choose("route", name, ROUTES)](scene, start, rng).at_speed(walking_speed)

@@ -141,7 +141,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
             x, y, yaw = single.scene.start
             y += float(rng.uniform(-1.0, 1.0)) * single.scene.start_width
             ahead = (x + SET_POINT * math.cos(yaw), y + SET_POINT * math.sin(yaw), yaw)
-            route = make_route(single._route_name, single.scene, ahead, rng)
+            route = make_route(single._route_name, single.scene, ahead, rng, single._walking_speed)
             self._give(i, (x, y, yaw), route)
             steps = math.ceil(route.duration / single.dt) + 1
             tapes.append([[*rng.standard_normal(1), *rng.standard_normal(1), *rng.random(4)] for _ in range(steps)])

@@ -42,7 +42,7 @@ def begin(world, settings, place):
             world.x, world.y, world.yaw = x, y, settings.start_yaw
         world.person_x, world.person_y = x + SET_POINT * cosine, y + SET_POINT * sine
         world.route_heading = settings.start_yaw
-        fits = draw_route(world, place)
+        fits = draw_route(world, place, settings.stretch)
     world.given_pose, world.given_route, world.route = False, False, settings.route
     world.heading = heading_at(world, 0.0)
     world.person_vx, world.person_vy = velocity(world, 0.0)

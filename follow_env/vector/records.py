@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from follow_env.routes import ROUTES
+from follow_env.routes import PAPER_SPEED, ROUTES
 
 if TYPE_CHECKING:
     from follow_env.env import FollowEnv
@@ -70,7 +70,7 @@ SETTINGS = np.dtype(
         ("pictures", np.bool_),
         ("wheel_actions", np.bool_),
         *((name, np.int64) for name in ("route", "substeps", "person_substeps", "delay")),
-        *_reals("dt", "decay", "start_x", "start_y", "start_yaw", "start_width"),
+        *_reals("dt", "decay", "stretch", "start_x", "start_y", "start_yaw", "start_width"),
         *_reals("track_width", "wheel_radius", "max_speed", "max_yaw_rate", "max_wheel_speed"),
         *_reals("max_wheel_acceleration", "camera_forward", "camera_height", "hull_radius", "half_view"),
         *_reals("bearing_bias", "bearing_noise", "bearing_keep", "bearing_fresh"),
@@ -102,6 +102,7 @@ def pack_settings(env: "FollowEnv") -> np.ndarray:
         "delay": env._delay,
         "dt": env.dt,
         "decay": math.exp(-env.dt / env._substeps / robot.wheel_time_constant),
+        "stretch": PAPER_SPEED / env._walking_speed,
         **dict(zip(("start_x", "start_y", "start_yaw"), start, strict=True)),
         "start_width": env.scene.start_width,
         "half_view": math.tan(0.5 * env.camera.hfov),

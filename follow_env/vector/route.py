@@ -21,13 +21,27 @@ _jit = njit(nogil=True, error_model="numpy", forceinline=True)
 
 
 @_jit
-def draw_route(world, place):
-    """Draw the route that the record names from the person's pose in it; False if none fits the place."""
+def draw_route(world, place, stretch):
+    """Draw the route that the record names from the person's pose in it; False if none fits the place.
+
+    All its times are those of the paper by `stretch`: `Route.at_speed`.
+    """
     world.turns = 0
     world.duration, world.ramp = DURATION, RAMP
-    world.distance_total = 0.0 if world.route == _STANDING else DISTANCE
-    if world.route != _PAPER:
+    if world.route == _STANDING:
+        world.distance_total = 0.0
         return True
+    world.distance_total = DISTANCE
+    fits = world.route != _PAPER or _draw_paper_route(world, place)
+    world.duration, world.ramp = stretch * DURATION, stretch * RAMP
+    for k in range(world.turns):
+        world.turn_start[k], world.turn_duration[k] = stretch * world.turn_start[k], stretch * world.turn_duration[k]
+    return fits
+
+
+@_jit
+def _draw_paper_route(world, place):
+    """Draw turns until the walk is free of obstacles; False if it never is: `routes.paper_route`."""
     world.turns = 1 if uniforms(world, 0, 1, START)[0] < 0.5 else 2
     for attempt in range(ATTEMPTS):
         _draw_turns(world, attempt)

@@ -1,7 +1,8 @@
-"""`follow bench followers`: every follower on the same seeds in two scenes, from parked to learned."""
+"""`follow bench followers`: every follower on the same seeds in two scenes and at four walking speeds."""
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,8 +19,14 @@ from baselines.benchmark.running import Played, rows, run
 from baselines.benchmark.statistics import Score
 from baselines.benchmark.store import Store
 from baselines.learned.agents import shipped, weights_file
+from follow_env.routes import PAPER_SPEED
 
 EPISODES = 100
+WALKING_SPEEDS = (0.5, 0.7, 1.1)
+"""The other speeds, m/s; the robot's limit is 1.2 m/s."""
+SPEED_EPISODES = 20
+"""At most so many for each of them."""
+SPEED_SCENE = "corridor"
 RANKED_TRAININGS = 5
 """An algorithm trained from fewer seeds is shown, but nothing is claimed of its rank."""
 REFERENCE = "AKF + PI"
@@ -37,7 +44,7 @@ SCORES = {
 """Score -> column of the episode's row, and whether it is pooled as a root mean square."""
 COMPARED = ("success", "angle_tracking_rmse_rad", "distance_tracking_rmse_m")
 COLUMNS = (
-    *("scene", "policy", "trainings", "episodes"),
+    *("scene", "walking_speed", "policy", "trainings", "episodes"),
     *(f"{name}{end}" for name in SCORES for end in ("", "_low", "_high")),
     *(f"{name}_minus_reference{end}" for name in COMPARED for end in ("", "_low", "_high")),
 )
@@ -50,13 +57,19 @@ def cells(agents: Sequence[str]) -> list[Cell]:
     return [cell_of(policy, scene) for scene in SCENES for policy in policies]
 
 
+def speed_cells(agents: Sequence[str]) -> list[Cell]:
+    """Cells at other walking speeds: followers with PI, the ceiling and the agents, in one scene."""
+    cells = [cell_of(policy, SPEED_SCENE) for policy in ("akf", UNBIASED, "none", "oracle", *agents)]
+    return [dataclasses.replace(cell, walking_speed=speed) for speed in WALKING_SPEEDS for cell in cells]
+
+
 def bench(
     episodes: int, calibration: Mapping[str, Any], episode: EpisodeFunction, out: Path, jobs: int, resume: bool
 ) -> str:
     """Play the suite and write `followers.md`, `followers.csv` and the raw episodes; see `running.run` for errors.
 
     Args:
-        episodes: Per cell.
+        episodes: Per cell, and at most `SPEED_EPISODES` at other walking speeds.
         calibration: Content of the calibration, part of the configuration's hash.
         episode: Plays one cell and seed.
         out: Results folder.
@@ -64,18 +77,22 @@ def bench(
         resume: Whether to go on with what the folder holds.
     """
     agents = shipped()
-    plan = {cell: range(episodes) for cell in cells(agents)}
+    studies = {"followers": cells(agents), "walking_speeds": speed_cells(agents)}
+    counts = {"followers": episodes, "walking_speeds": min(episodes, SPEED_EPISODES)}
+    plan = {cell: range(counts[name]) for name, group in studies.items() for cell in group}
     weights = {name: hashlib.sha256(weights_file(name).read_bytes()).hexdigest() for name in agents}
     settings = {**configuration.settings(calibration), "benchmark": "followers", "agents": weights}
     digest = configuration.run_digest(settings)
     config = configuration.text(
-        settings, digest, {"followers": list(plan)}, {"followers": list(range(episodes))}, out, jobs
+        settings, digest, studies, {name: list(range(count)) for name, count in counts.items()}, out, jobs
     )
     tasks = [(cell, seed) for cell, seeds in plan.items() for seed in seeds]
 
     def write(store: Store) -> tuple[str, Played]:
         played = {cell: [store.episode(cell, seed) for seed in seeds] for cell, seeds in plan.items()}
-        write_csv(out / "episodes.csv", metrics.COLUMNS, rows(played))
+        speeds = [cell.walking_speed for cell, seeds in plan.items() for _ in seeds]
+        walked = [{"walking_speed": speed, **row} for speed, row in zip(speeds, rows(played), strict=True)]
+        write_csv(out / "episodes.csv", ("walking_speed", *metrics.COLUMNS), walked)
         found = records({cell: [one.row for one in group] for cell, group in played.items()})
         write_csv(out / "followers.csv", COLUMNS, found, _DIGITS)
         text = report(found)
@@ -86,33 +103,34 @@ def bench(
 
 
 def records(played: Mapping[Cell, Sequence[Row]]) -> list[dict[str, Value]]:
-    """One record of `COLUMNS` for each scene and policy; the trainings of one recipe make one policy.
+    """One record of `COLUMNS` for each scene, speed and policy; the trainings of one recipe make one policy.
 
     Args:
         played: Episode rows of each cell in the order of their seeds.
     """
-    groups: dict[tuple[str, str], list[Sequence[Row]]] = {}
+    groups: dict[tuple[str, float, str], list[Sequence[Row]]] = {}
     for cell, group in played.items():
         ended = [
             {**row, "collided": int(row["ended"] == "collision"), "lost": int(row["ended"] == "lost")} for row in group
         ]
-        groups.setdefault((cell.scene, policy_name(cell)), []).append(ended)
+        groups.setdefault((cell.scene, cell.walking_speed, policy_name(cell)), []).append(ended)
     scores = {
         key: {name: Score.of(trainings, *how) for name, how in SCORES.items()} for key, trainings in groups.items()
     }
     found = []
-    for (scene, policy), trainings in groups.items():
+    for (scene, speed, policy), trainings in groups.items():
         record: dict[str, Value] = {
             "scene": scene,
+            "walking_speed": speed,
             "policy": policy,
             "trainings": len(trainings) if _learned(policy) else None,
             "episodes": len(trainings[0]),
         }
-        for name, score in scores[scene, policy].items():
+        for name, score in scores[scene, speed, policy].items():
             record[name] = score.value
             record[f"{name}_low"], record[f"{name}_high"] = score.interval or (None, None)
         for name in COMPARED:
-            difference = scores[scene, policy][name].minus(scores[scene, REFERENCE][name])
+            difference = scores[scene, speed, policy][name].minus(scores[scene, speed, REFERENCE][name])
             is_reference = policy == REFERENCE
             low, high = difference.interval or (None, None)
             for end, value in (("", difference.value), ("_low", low), ("_high", high)):
@@ -132,10 +150,11 @@ def policy_name(cell: Cell) -> str:
 
 def report(found: Sequence[Mapping[str, Value]]) -> str:
     """Return the table as Markdown that also reads well on a terminal."""
+    usual = [record for record in found if record["walking_speed"] == PAPER_SPEED]
     header = ["scene", "policy", "success", "angle RMSE (rad)", "distance RMSE (cm)", "minus AKF + PI (cm)"]
     header += ["lost", "collided", "losses", "jerk (m/s³)", "trainings"]
     lines = []
-    for record in found:
+    for record in usual:
         lines.append(
             [
                 str(record["scene"]),
@@ -160,7 +179,7 @@ def report(found: Sequence[Mapping[str, Value]]) -> str:
     )
     parts = [
         "# Followers",
-        f"{found[0]['episodes']} episodes per cell on the same seeds, in PyBullet. Angle and distance RMSE are "
+        f"{usual[0]['episodes']} episodes per cell on the same seeds, in PyBullet. Angle and distance RMSE are "
         "tracking errors: the person's true bearing and\ndistance against the set point (0 rad, 1.5 m), pooled over "
         "all steps. 95 % bootstrap intervals over episodes and trainings;\nlearned policies: interquartile mean over "
         "the trainings (the mean of fewer than four). Losses: times per episode that the person left the view.",
@@ -171,7 +190,30 @@ def report(found: Sequence[Mapping[str, Value]]) -> str:
         parts.append(
             f"Trained from fewer than {RANKED_TRAININGS} seeds, so nothing is claimed of the rank of: {', '.join(few)}."
         )
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join(parts + _speed_parts(found)) + "\n"
+
+
+def _speed_parts(found: Sequence[Mapping[str, Value]]) -> list[str]:
+    """Return the paragraphs about other walking speeds, if any were played."""
+    at = {(record["policy"], record["walking_speed"]): record for record in found if record["scene"] == SPEED_SCENE}
+    speeds = sorted({float(str(speed)) for _, speed in at})
+    if len(speeds) == 1:
+        return []
+    policies = dict.fromkeys(policy for policy, speed in at if speed != PAPER_SPEED)
+    lines = [[str(policy), *(_at_speed(at[policy, speed]) for speed in speeds)] for policy in policies]
+    most = max(int(str(record["episodes"])) for (_, speed), record in at.items() if speed != PAPER_SPEED)
+    return [
+        "## Walking speeds",
+        f"Distance RMSE (cm) in the {SPEED_SCENE} when the person walks slower or faster, {most} episodes each (at "
+        f"{PAPER_SPEED:.2f} m/s those above),\nand the success where it is not 100 %. The robot's limit is 1.2 m/s; "
+        "ppo_pixels was trained at one speed.",
+        markdown_table(["policy", *(f"{speed:.2f} m/s" for speed in speeds)], lines, left=1),
+    ]
+
+
+def _at_speed(record: Mapping[str, Value]) -> str:
+    success = _number(record, "success")
+    return _interval(record, "distance_tracking_rmse_m", 100.0, 1) + ("" if success == 1.0 else f", {success:.0%}")
 
 
 def _learned(policy: str) -> bool:

@@ -1,5 +1,6 @@
 """The followers' table: floors and ceiling behave, scores follow from the rows."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 
@@ -122,6 +123,29 @@ def test_a_policy_that_errs_twice_as_much_differs_by_the_reference() -> None:
         )
     text = report(found)
     assert "nothing is claimed of the rank of: ppo." in text
+
+
+def test_other_walking_speeds_have_a_table_of_their_own() -> None:
+    slow = row(distance_tracking_rmse_m=0.1, success=0.5)
+    usual = Cell("emulated", "corridor", "akf", sensor="default")
+    played = {usual: drawn(3, 0.2), dataclasses.replace(usual, walking_speed=0.5): [slow, slow]}
+    text = report(records(played))
+    table, other = text.split("## Walking speeds")
+    assert table.count("AKF + PI |") == 1
+    assert "2 episodes each" in other
+    (line,) = (line for line in other.splitlines() if line.startswith("| AKF + PI"))
+    assert line.split("|")[2].strip() == "10.0 (10.0 to 10.0), 50%"
+    assert "Walking speeds" not in report(records({usual: drawn(3, 0.2)}))
+
+
+def test_a_cell_at_another_speed_is_played_at_it() -> None:
+    player = Player()
+    usual = cell_of("oracle", "corridor")
+    fast = dataclasses.replace(usual, walking_speed=1.1)
+    assert fast.key == usual.key + "/w1.1"
+    assert float(str(player(usual, 3).row["duration_s"])) == pytest.approx(14.0)
+    assert float(str(player(fast, 3).row["duration_s"])) == pytest.approx(14.0 * 12.0 / 13.0 / 1.1, abs=1.0 / 30.0)
+    player.close()
 
 
 def test_policies_are_named_as_people_say() -> None:

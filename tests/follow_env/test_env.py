@@ -280,6 +280,20 @@ def test_a_sensor_can_be_chosen_for_one_episode(make, equal):
     assert abs(usual[1] - info["distance"]) > 0.05
 
 
+def test_a_walking_speed_can_be_chosen_for_one_episode(make):
+    """The speed of the person is that in the middle of the walk, then the setting's again; the path is the same."""
+    env, ends = make(obs="state", walking_speed=0.5), []
+    for speed, wanted in ((1.1, 1.1), (None, 0.5)):
+        env.reset(seed=2, options={"walking_speed": speed} if speed else None)
+        truncated, speeds = False, []
+        while not truncated:
+            *_, truncated, info = env.step(np.zeros(2))
+            speeds.append(math.hypot(*info["person_velocity"]))
+        assert speeds[len(speeds) // 2] == pytest.approx(wanted)
+        ends.append(info["person_pose"])
+    assert ends[0] == pytest.approx(ends[1], abs=1e-3)
+
+
 def test_an_outfit_can_be_chosen_for_one_episode(make):
     env = make(obs="rgbd", outfit="blue", route="standing")
     dressed = {}
@@ -300,6 +314,7 @@ def test_an_outfit_can_be_chosen_for_one_episode(make):
         ({"person": "wman"}, ("'wman'", "did you mean 'woman'")),
         ({"outfit": "bleu"}, ("'bleu'", "did you mean 'blue'")),
         ({"sensor": {"measurement": {"mis_share": 0.5}}}, ("'mis_share'", "did you mean 'miss_share'")),
+        ({"walking_speed": 3.0}, ("3.0", "m/s from 0.2 to 2.0")),
         ({"robot_pose": (1.0, 2.0)}, ("(1.0, 2.0)", "three finite numbers")),
         ({"robot_pose": (1.0, 2.0, math.nan)}, ("nan", "three finite numbers")),
         ({"robot_pose": 3}, ("3", "three finite numbers")),

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from follow_env.routes import CLEARANCE, ROUTES, TABLE_STEP, Route, Turn, make_route
+from follow_env.routes import CLEARANCE, PAPER_SPEED, ROUTES, TABLE_STEP, Route, Turn, check_walking_speed, make_route
 from follow_env.scene import Box
 from follow_env.scenes import make_scene
 
@@ -224,3 +224,36 @@ def test_a_scene_without_room_is_said_to_have_none():
 def test_an_unknown_route_names_the_nearest():
     with pytest.raises(ValueError, match=r"'papr'.*did you mean 'paper'"):
         make_route("papr", make_scene("corridor"), START, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("speed", [0.2, 0.5, 1.1, 2.0])
+def test_another_walking_speed_walks_the_same_path(speed):
+    """At t times the stretch the person is where the paper's is at t; the way walked and the cruise agree with that."""
+    scene = make_scene("indoor")
+    for seed in range(5):
+        usual, other = (
+            make_route("paper", scene, (0.0, 0.1, 0.0), np.random.default_rng(seed), v) for v in (PAPER_SPEED, speed)
+        )
+        stretch = (12.0 / 13.0) / speed
+        assert other.duration == pytest.approx(14.0 * stretch)
+        assert other.speed(other.duration / 2.0) == pytest.approx(speed)
+        for share in np.linspace(0.0, 1.0, 57):
+            t = 14.0 * float(share)
+            assert other.pose(stretch * t) == pytest.approx(usual.pose(t), abs=3e-4)
+            assert other.walked(stretch * t) == pytest.approx(usual.walked(t))
+            assert other.velocity(stretch * t) == pytest.approx([v / stretch for v in usual.velocity(t)], abs=1e-9)
+
+
+def test_who_stands_has_no_speed_and_the_papers_speed_changes_nothing():
+    scene, start = make_scene("corridor"), (1.0, 0.2, 0.3)
+    standing = make_route("standing", scene, start, np.random.default_rng(0), 0.5)
+    assert standing.duration == 14.0
+    assert standing.pose(9.0) == start
+    straight = Route(start)
+    assert straight.at_speed(PAPER_SPEED) is straight
+
+
+@pytest.mark.parametrize("speed", [0.1, 2.1, -1.0, float("nan"), "fast"])
+def test_an_impossible_walking_speed_is_refused(speed):
+    with pytest.raises(ValueError, match=r"walking_speed is .*; expected m/s from 0.2 to 2.0"):
+        check_walking_speed(speed)

@@ -37,7 +37,11 @@ def chase_by_wheels(info):
 @SCENE
 @pytest.mark.parametrize(
     ("settings", "policy"),
-    [({"obs": "measurement", "latency_s": 0.1}, chase), ({"obs": "state", "action": "wheels"}, chase_by_wheels)],
+    [
+        ({"obs": "measurement", "latency_s": 0.1}, chase),
+        ({"obs": "state", "action": "wheels"}, chase_by_wheels),
+        ({"obs": "measurement", "walking_speed": 1.1}, chase),
+    ],
 )
 def test_the_same_episodes_come_out_step_by_step(scene, settings, policy):
     """Routes, errors, delays, rewards, endings and every entry of info; the robot within centimetres."""
@@ -49,8 +53,10 @@ def test_the_same_episodes_come_out_step_by_step(scene, settings, policy):
     starts = [single.reset(seed=seed) for single, seed in zip(singles, seeds, strict=True)]
     assert [o.tolist() for o, _ in starts] == observations.tolist()
     last = [info for _, info in starts]
-    valid = 0
-    for _ in range(420):
+    valid = steps = 0
+    truncated = np.zeros(len(seeds), bool)
+    while not truncated.all():
+        steps += 1
         observations, rewards, terminated, truncated, infos = batch.step(actions := np.array([policy(i) for i in last]))
         for i, single in enumerate(singles):
             observation, reward, *ends, last[i] = single.step(actions[i])
@@ -66,11 +72,31 @@ def test_the_same_episodes_come_out_step_by_step(scene, settings, policy):
                 else:
                     tolerance = 1e-4 if key.startswith("person") else 0.04
                     assert np.abs(np.asarray(infos[key][i], float) - np.asarray(value, float)).max() < tolerance, key
-    assert truncated.all()
-    assert settings["obs"] == "state" or 0.5 < valid / 840 < 0.95
+    assert steps == math.ceil(singles[0]._route.duration * 30.0 - 1e-9)
+    assert settings["obs"] == "state" or 0.5 < valid / (2 * steps) < 0.95
     batch.close()
     for single in singles:
         single.close()
+
+
+@SCENE
+def test_half_the_walking_speed_takes_twice_the_time(scene):
+    """The routes that the batch draws itself: the same places, every second step."""
+    usual, slow = (
+        FollowVectorEnv(50, scene=scene, obs="state", walking_speed=12.0 / 13.0 / stretch) for stretch in (1, 2)
+    )
+    away = {"robot_pose": (-2.0, 0.0, 0.0)}
+    usual.reset(seed=4, options=away)
+    slow.reset(seed=4, options=away)
+    for _ in range(419):
+        *_, terminated, truncated, info = usual.step(np.zeros((50, 2)))
+        slow.step(np.zeros((50, 2)))
+        *_, slow_truncated, slow_info = slow.step(np.zeros((50, 2)))
+        assert not (terminated | truncated | slow_truncated).any()
+        assert slow_info["person_pose"] == pytest.approx(info["person_pose"], abs=1e-4)
+        assert 2.0 * slow_info["person_velocity"] == pytest.approx(info["person_velocity"], abs=1e-6)
+    usual.close()
+    slow.close()
 
 
 @SCENE

@@ -24,10 +24,7 @@ EPISODES = {"truth": 100, "emulated": 100, "mask": 20, "detector": 20}
 
 _STUDY_PART = {"sensitivity": 10, "family": 10, "rules": 2}
 """A study plays this part of the table's episodes, two at least."""
-_PACKAGES = (
-    *("follow-env", "gymnasium", "matplotlib", "numpy", "opencv-python-headless"),
-    *("pybullet", "scipy", "tqdm"),
-)
+_PACKAGES = ("follow-env", "gymnasium", "matplotlib", "numpy", "opencv-python-headless", "pybullet", "tqdm")
 
 
 @dataclass(frozen=True)

@@ -38,11 +38,17 @@ _jit = njit(nogil=True, error_model="numpy")
 
 
 @_jit
-def lamp_light(dx, dy, dz, nx, ny, nz, strength):
-    """Return the light of one lamp at the offset (dx, dy, dz) m from a surface with this unit normal."""
+def lamp_lights(dx, dy, dz, nx, ny, nz, strength):
+    """Return the light of one lamp at the offset (dx, dy, dz) m on both sides of a surface with this unit normal."""
     q = _ONE / math.sqrt(((dx * dx + dy * dy) + dz * dz) + SOFT)
-    facing = max(((nx * dx + ny * dy) + nz * dz) * q, _ZERO)
-    return strength * (q * q) * (BOUNCE + DIRECT * facing)
+    facing, full = ((nx * dx + ny * dy) + nz * dz) * q, strength * (q * q)
+    return full * (BOUNCE + DIRECT * max(facing, _ZERO)), full * (BOUNCE + DIRECT * max(-facing, _ZERO))
+
+
+@_jit
+def lamp_light(dx, dy, dz, nx, ny, nz, strength):
+    """Return the light of one lamp on the side of a surface that its normal points to: see `lamp_lights`."""
+    return lamp_lights(dx, dy, dz, nx, ny, nz, strength)[0]
 
 
 @_jit

@@ -102,7 +102,7 @@ def make_workspace(scene: ScenePack, vertices: int, faces: int) -> Workspace:
         whole(rounds, 5),
         np.zeros((len(scene.balls), 7)),
         whole(len(scene.balls), 5),
-        np.zeros((vertices, 3)),
+        np.zeros((5, vertices)),
         real(vertices),
         real(vertices),
         real(faces + 1, TRIANGLE_NUMBERS),

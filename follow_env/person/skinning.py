@@ -95,10 +95,10 @@ def skin(
         for k in range(4):
             w = weights[v, k]
             if w > 0.0:
-                m = moves[bones[v, k]]
-                sx += w * (m[0, 0] * px + m[0, 1] * py + m[0, 2] * pz + m[0, 3])
-                sy += w * (m[1, 0] * px + m[1, 1] * py + m[1, 2] * pz + m[1, 3])
-                sz += w * (m[2, 0] * px + m[2, 1] * py + m[2, 2] * pz + m[2, 3])
+                b = bones[v, k]
+                sx += w * (moves[b, 0, 0] * px + moves[b, 0, 1] * py + moves[b, 0, 2] * pz + moves[b, 0, 3])
+                sy += w * (moves[b, 1, 0] * px + moves[b, 1, 1] * py + moves[b, 1, 2] * pz + moves[b, 1, 3])
+                sz += w * (moves[b, 2, 0] * px + moves[b, 2, 1] * py + moves[b, 2, 2] * pz + moves[b, 2, 3])
         vertices[v, 0] = sx
         vertices[v, 1] = sy
         vertices[v, 2] = sz

@@ -3,7 +3,7 @@
 
 import sys
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -29,16 +29,16 @@ from follow_env.camera.raster_setup import find_balls, find_cylinders, find_face
 from follow_env.camera.raster_shade import BACKGROUND, shade_surface, shade_triangle
 
 
-def _digest() -> int:
-    """Return a checksum of the kernels' sources.
+def digest(paths: Iterable[Path]) -> int:
+    """Return a checksum of the sources of a compiled function.
 
-    Numba's cache looks only at the file of the cached function itself. The checksum is a closure variable of `draw`,
-    and so part of its cache key: a change in any of the other files is noticed as well.
+    Numba's cache looks only at the file of the cached function itself. As a closure variable of it the checksum is part
+    of its cache key: a change in any of the other files is noticed as well.
     """
-    digest = 0
-    for path in sorted([*Path(__file__).parent.glob("raster_*.py"), Path(__file__).parent / "textures.py"]):
-        digest = zlib.crc32(path.read_bytes(), digest)
-    return digest
+    result = 0
+    for path in sorted(paths):
+        result = zlib.crc32(path.read_bytes(), result)
+    return result
 
 
 def _compiled(sources: int) -> Callable[..., int]:
@@ -222,7 +222,7 @@ def _write_tile(row, column, view, scene, people, work, triangles, coloured, rgb
                 rgb[y0 + i, x0 + j, 2] = np.uint8(colour >> np.uint32(16))
 
 
-draw = _compiled(_digest())
+draw = _compiled(digest([*Path(__file__).parent.glob("raster_*.py"), Path(__file__).parent / "textures.py"]))
 
 
 @njit(cache=True, nogil=True)

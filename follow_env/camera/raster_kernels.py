@@ -26,7 +26,7 @@ from follow_env.camera.raster_fill import (
 from follow_env.camera.raster_people import find_triangles
 from follow_env.camera.raster_scene import CYLINDER_PARTS, FACES
 from follow_env.camera.raster_setup import find_balls, find_cylinders, find_facets
-from follow_env.camera.raster_shade import BACKGROUND, shade_surface, shade_triangle
+from follow_env.camera.raster_shade import BACKGROUND, shade_surface, shade_triangles
 
 
 def digest(paths: Iterable[Path]) -> int:
@@ -75,9 +75,9 @@ def _compiled(sources: int) -> Callable[..., int]:
                     count += 1
             for column in range(view.columns):
                 n = row * view.columns + column
-                inside = entries[starts[n] : starts[n + 1]]
-                _fill_tile(row, column, view, scene, work, count, rounds, balls, inside)
-                _write_tile(row, column, view, scene, people, work, inside.size, coloured, rgb, depth, ids)
+                start, stop = starts[n], starts[n + 1]
+                _fill_tile(row, column, view, scene, work, count, rounds, balls, entries, start, stop)
+                _write_tile(row, column, view, scene, people, work, stop > start, coloured, rgb, depth, ids)
         return 0
 
     return draw
@@ -109,8 +109,11 @@ def _sort_into_tiles(triangles, view, places):
 
 
 @_inline
-def _fill_tile(row, column, view, scene, work, count, rounds, balls, inside):
-    """Find what a tile sees of the first `count` facets of `work.row`, cylinders, balls, the triangles `inside`."""
+def _fill_tile(row, column, view, scene, work, count, rounds, balls, entries, start, stop):
+    """Find what a tile sees of the first `count` facets of `work.row`, cylinders, balls and some triangles.
+
+    The triangles are `entries` from `start` to before `stop`.
+    """
     lanes, seen = work.lanes, work.seen
     background, limit = np.float32(1.0 / view.far), np.float32(1.0 / view.near)
     left, top = view.left + column * TILE * view.step, view.top + row * TILE * view.step
@@ -135,34 +138,31 @@ def _fill_tile(row, column, view, scene, work, count, rounds, balls, inside):
             fill_ball(records, k, np.int32(first + places[k, 0]), lanes, seen, view.near)
     first = scene.surfaces.shape[0]
     triangles, places = work.triangles, work.triangle_places
-    for t in inside:
+    for n in range(start, stop):
+        t = entries[n]
         upper, lower = max(places[t, 3] - row * TILE, 0), min(places[t, 4] - row * TILE, TILE - 1)
         fill_triangle(triangles, t, upper, lower, np.int32(first + t), lanes, seen, limit)
 
 
 @_inline
-def _colour_tile(height, width, view, scene, people, work):
+def _colour_tile(height, width, view, scene, people, work, triangles):
     """Write the colours of the first `height` rows and `width` columns of a tile into `work.colours`.
 
     A surface of the scene is shaded once, from the first to the last row that shows it.
     """
-    lanes, seen, colours, triangles, places = work.lanes, work.seen, work.colours, work.triangles, work.triangle_places
-    pattern, albedo = people.pattern, people.colours
+    lanes, seen, colours = work.lanes, work.seen, work.colours
     surfaces, textures, lamps, ambient = scene.surfaces, scene.textures, scene.lamps, scene.ambient
     static = surfaces.shape[0]
+    if triangles:
+        records, places, pattern, albedo = work.triangles, work.triangle_places, people.pattern, people.colours
+        shade_triangles(height, width, static, places, pattern, albedo, records, lanes, seen, colours)
     done, number_done = work.done, 0
     previous = np.int32(-1)
     for i in range(height):
         for j in range(width):
             k = np.uint64(i * TILE + j)
             number = seen[k]
-            if number == previous:
-                continue
-            if number >= static:
-                t = number - static
-                f = places[t, 0]
-                red, green, blue = albedo[f, 0], albedo[f, 1], albedo[f, 2]
-                colours[k] = shade_triangle(k, t, pattern[f], red, green, blue, triangles, lanes)
+            if number == previous or number >= static:
                 continue
             if number == 0:
                 colours[k] = BACKGROUND
@@ -192,7 +192,7 @@ def _last_row(seen, number, first, height):
 
 @_inline
 def _write_tile(row, column, view, scene, people, work, triangles, coloured, rgb, depth, ids):
-    """Copy a tile, in which `triangles` may be seen, to the picture."""
+    """Copy a tile to the picture; `triangles` says whether some may be seen in it."""
     lanes, seen, colours, places, names = work.lanes, work.seen, work.colours, work.triangle_places, people.ids
     x0, y0 = np.uint64(column * TILE), np.uint64(row * TILE)
     width, height = min(TILE, view.width - column * TILE), min(TILE, view.height - row * TILE)
@@ -213,7 +213,7 @@ def _write_tile(row, column, view, scene, people, work, triangles, coloured, rgb
                 if number >= static:
                     ids[y0 + i, x0 + j] = names[places[number - static, 0]]
     if coloured:
-        _colour_tile(height, width, view, scene, people, work)
+        _colour_tile(height, width, view, scene, people, work, triangles)
         for i in range(rows):
             for j in range(columns):
                 colour = colours[np.uint64(TILE) * i + j]

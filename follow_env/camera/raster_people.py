@@ -58,15 +58,16 @@ def find_triangles(view, people, scene, work):
             if not (_pixels(x0, x1, view.width, place, count, 1) and _pixels(y0, y1, view.height, place, count, 3)):
                 continue
             place[count, 0] = f
-            lit = front
+            light = front[i], front[j], front[k]
             if volume < 0.0:  # the back of the triangle: the other way round
-                j, k, volume, lit = k, j, -volume, back
+                j, k, volume = k, j, -volume
                 bx, by, bz, cx, cy, cz = cx, cy, cz, bx, by, bz
+                light = back[i], back[j], back[k]
             edge(bx, by, bz, ax, ay, az, records, count, 0)
             edge(cx, cy, cz, bx, by, bz, records, count, 3)
             edge(ax, ay, az, cx, cy, cz, records, count, 6)
             inverse = 1.0 / volume
-            _interpolate(i, j, k, inverse, lit, records, count)
+            _interpolate(light, inverse, records, count)
             if pattern[f]:
                 _interpolate_anchors(i, j, k, inverse, anchors, records, count)
             count += 1
@@ -118,12 +119,12 @@ def _pixels(start, stop, size, place, row, column):
 
 
 @_jit
-def _interpolate(i, j, k, inverse, light, records, row):
+def _interpolate(light, inverse, records, row):
     """Write the planes of 1/Z and light/Z: the edge opposite to a corner, over the volume, is its share over Z."""
     for m in range(3):
         a, b, c = inverse * records[row, 3 + m], inverse * records[row, 6 + m], inverse * records[row, m]
         records[row, 9 + m] = (a + b) + c
-        records[row, 12 + m] = (a * light[i] + b * light[j]) + c * light[k]
+        records[row, 12 + m] = (a * light[0] + b * light[1]) + c * light[2]
 
 
 @_jit

@@ -183,8 +183,7 @@ def _shade_surfaces(height, width, view, surfaces, textures, lamps, ambient, don
     number_done = 0
     previous = np.int32(-1)
     for i in range(height):
-        for j in range(width):
-            k = np.uint64(i * TILE + j)
+        for k in range(np.uint64(TILE * i), np.uint64(TILE * i + width)):
             number = seen[k]
             if number == previous or number >= surfaces.shape[0]:
                 continue

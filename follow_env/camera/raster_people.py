@@ -25,18 +25,19 @@ def find_triangles(view, people, scene, work):
     near = view.near
     vertices, faces, anchors = people.vertices, people.faces, people.anchors
     pattern, borders = people.pattern, people.borders
-    points, records, place = work.camera_points, work.triangles, work.triangle_places
+    points, surface, records, place = work.camera_points, work.surface, work.triangles, work.triangle_places
     front, back = work.front_light, work.back_light
     corners, bounds = work.quad, work.bounds
     count = 0
     for person in range(people.starts.shape[0] - 1):
         first, last = people.starts[person, 0], people.starts[person + 1, 0]
-        ahead = _to_camera(view, vertices, first, last, points)
+        _columns(vertices, people.normals, first, last, surface)
+        ahead = _to_camera(view, surface, first, last, points)
         if ahead < 0:
             return -1
         if ahead == 0:
             continue
-        _light_vertices(vertices, people.normals, first, last, scene.lamps, scene.ambient, front, back)
+        _light_vertices(surface, first, last, scene.lamps, scene.ambient, front, back)
         for f in range(people.starts[person, 1], people.starts[person + 1, 1]):
             i, j, k = np.uint64(faces[f, 0]), np.uint64(faces[f, 1]), np.uint64(faces[f, 2])
             ax, ay, az = points[0, i], points[1, i], points[2, i]
@@ -75,7 +76,15 @@ def find_triangles(view, people, scene, work):
 
 
 @_jit
-def _to_camera(view, vertices, first, last, points):
+def _columns(vertices, normals, first, last, surface):
+    """Copy coordinate by coordinate to `surface` (6, V): the compiler makes vectors of what lies in a row."""
+    for i in range(np.uint64(first), np.uint64(last)):
+        for m in range(np.uint64(3)):
+            surface[m, i], surface[m + np.uint64(3), i] = vertices[i, m], normals[i, m]
+
+
+@_jit
+def _to_camera(view, surface, first, last, points):
     """Write vertices in the camera frame, and their columns and rows in the picture, to `points` (5, V).
 
     Return how many lie beyond the near plane, or -1 if one is not finite.
@@ -84,7 +93,7 @@ def _to_camera(view, vertices, first, last, points):
     left, top, step = view.left, view.top, view.step
     ahead, lost = 0, 0
     for i in range(np.uint64(first), np.uint64(last)):
-        dx, dy, dz = vertices[i, 0] - ex, vertices[i, 1] - ey, vertices[i, 2] - ez
+        dx, dy, dz = surface[0, i] - ex, surface[1, i] - ey, surface[2, i] - ez
         x, y, z = s * dx - c * dy, -dz, c * dx + s * dy
         points[0, i], points[1, i], points[2, i] = x, y, z
         points[3, i], points[4, i] = (x / z - left) / step, (y / z - top) / step
@@ -94,7 +103,7 @@ def _to_camera(view, vertices, first, last, points):
 
 
 @_jit
-def _light_vertices(vertices, normals, first, last, lamps, ambient, front, back):
+def _light_vertices(surface, first, last, lamps, ambient, front, back):
     """Write the light on both sides of the surface at each vertex."""
     start, stop = np.uint64(first), np.uint64(last)
     for i in range(start, stop):
@@ -102,8 +111,8 @@ def _light_vertices(vertices, normals, first, last, lamps, ambient, front, back)
     for n in range(lamps.shape[0]):
         lx, ly, lz, strength = lamps[n, 0], lamps[n, 1], lamps[n, 2], lamps[n, 3]
         for i in range(start, stop):
-            dx, dy, dz = lx - vertices[i, 0], ly - vertices[i, 1], lz - vertices[i, 2]
-            ahead, behind = lamp_lights(dx, dy, dz, normals[i, 0], normals[i, 1], normals[i, 2], strength)
+            dx, dy, dz = lx - surface[0, i], ly - surface[1, i], lz - surface[2, i]
+            ahead, behind = lamp_lights(dx, dy, dz, surface[3, i], surface[4, i], surface[5, i], strength)
             front[i] += ahead
             back[i] += behind
 

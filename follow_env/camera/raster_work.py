@@ -73,6 +73,7 @@ class Workspace(NamedTuple):
     round_places: np.ndarray
     balls: np.ndarray
     ball_places: np.ndarray
+    surface: np.ndarray
     camera_points: np.ndarray
     front_light: np.ndarray
     back_light: np.ndarray
@@ -157,6 +158,7 @@ def make_workspace(scene: ScenePack, vertices: int, faces: int) -> Workspace:
         whole(rounds, 5),
         np.zeros((len(scene.balls), 7)),
         whole(len(scene.balls), 5),
+        real(6, vertices),
         np.zeros((5, vertices)),
         real(vertices),
         real(vertices),

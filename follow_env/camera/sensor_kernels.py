@@ -293,30 +293,31 @@ def _corrupt_colour(rgb, seed, model, work, out):
     """Write the blurred, exposed and noisy picture."""
     height, three, one = np.uint64(rgb.shape[0]), np.uint64(3), np.uint64(1)
     source, target = rgb.reshape(rgb.shape[0], -1), out.reshape(rgb.shape[0], -1)
-    taps, rows, bits, levels = model.taps, work.colour_rows, work.colour_bits, work.levels
+    taps, bits, levels = model.taps, work.colour_bits, work.levels
+    line, smooth = work.colour_rows[0], work.colour_rows[1]
     count, columns, pad = np.uint64(source.shape[1]), np.uint64(bits.size), np.uint64(3 * (taps.size - 1))
     gain, read, shot = model.gain, model.read_noise * model.read_noise, model.shot_noise * model.shot_noise
     _seed(seed, _COLOUR, bits)
     for i in range(height):
         for k in range(count):
-            rows[0, pad + k] = gain * taps[0] * np.float32(source[i, k])
+            line[pad + k] = gain * taps[0] * np.float32(source[i, k])
         for t in range(one, np.uint64(taps.size)):
             above, below, weight = (i - t if i > t else np.uint64(0)), min(i + t, height - one), gain * taps[t]
             for k in range(count):
-                rows[0, pad + k] += weight * np.float32(np.int32(source[above, k]) + np.int32(source[below, k]))
+                line[pad + k] += weight * np.float32(np.int32(np.int32(source[above, k]) + np.int32(source[below, k])))
         for k in range(pad):
-            rows[0, k] = rows[0, pad + k % three]
-            rows[0, pad + count + k] = rows[0, pad + count - three + k % three]
+            line[k] = line[pad + k % three]
+            line[pad + count + k] = line[pad + count - three + k % three]
         for k in range(columns):
-            rows[1, k] = taps[0] * rows[0, pad + k]
+            smooth[k] = taps[0] * line[pad + k]
         for t in range(one, np.uint64(taps.size)):
             left, right, weight = pad - three * t, pad + three * t, taps[t]
             for k in range(columns):
-                rows[1, k] += weight * (rows[0, left + k] + rows[0, right + k])
+                smooth[k] += weight * (line[left + k] + line[right + k])
         for k in range(columns):
             state = _advance(bits[k])
             bits[k] = state
-            level = rows[1, k]
+            level = smooth[k]
             level += math.sqrt(read + shot * level) * _near_normal(state)
             levels[k] = np.int32(min(max(level, _ZERO), _FULL) + _HALF)
         for k in range(count):

@@ -95,7 +95,7 @@ def skin(
         for k in range(4):
             w = weights[v, k]
             if w > 0.0:
-                b = bones[v, k]
+                b = np.uint64(bones[v, k])
                 sx += w * (moves[b, 0, 0] * px + moves[b, 0, 1] * py + moves[b, 0, 2] * pz + moves[b, 0, 3])
                 sy += w * (moves[b, 1, 0] * px + moves[b, 1, 1] * py + moves[b, 1, 2] * pz + moves[b, 1, 3])
                 sz += w * (moves[b, 2, 0] * px + moves[b, 2, 1] * py + moves[b, 2, 2] * pz + moves[b, 2, 3])
@@ -109,7 +109,7 @@ def smooth_normals(vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray)
     """Write unit normals (V, 3) float32: the mean of the faces around a vertex, weighted by their area."""
     normals[:] = 0.0
     for f in range(len(faces)):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        a, b, c = np.uint64(faces[f, 0]), np.uint64(faces[f, 1]), np.uint64(faces[f, 2])
         ux, uy, uz = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2]
         vx, vy, vz = vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2]
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx

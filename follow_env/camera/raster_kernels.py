@@ -104,8 +104,8 @@ def _compiled(sources: int) -> Callable[..., int]:
                 if stop > start:
                     looks = triangle_places, pattern, albedo, triangles
                     shade_triangles(height, width, static, *looks, lanes, seen, colours)
-                given = view, surfaces, textures, lamps, scene.ambient
-                _shade_surfaces(height, width, *given, done, lanes, seen, colours)
+                lit = surfaces, textures, lamps, scene.ambient
+                _shade_surfaces(height, width, view, *lit, done, lanes, seen, colours)
                 _write_colours(*place, colours, rgb)
         return 0
 

@@ -74,11 +74,11 @@ class RGBDSensor:
             band=depth.edge_band,
         )
         sigma = depth.lateral_noise * scale
-        taps, noise = _gaussian_taps(colour.blur * scale), (colour.read_noise, colour.shot_noise)
-        exact = taps.size == 1 and colour.gain == 1.0 and not any(noise)
+        taps = _gaussian_taps(colour.blur * scale)
+        exact = taps.size == 1 and colour.gain == 1.0 and not (colour.read_noise or colour.shot_noise)
         self.model = SensorModel(
             dials,
-            ColourModel(real(colour.gain), *(real(value) for value in noise), taps, exact),
+            ColourModel(real(colour.gain), real(colour.read_noise), real(colour.shot_noise), taps, exact),
             _quantiles(NORMAL_BITS).astype(np.float32),
             np.rint(sigma * _quantiles(SHIFT_BITS)).astype(np.int32),
         )

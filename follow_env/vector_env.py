@@ -15,16 +15,14 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from follow_env.camera.raster_kernels import announced
-from follow_env.camera.sensor import packed
 from follow_env.config import RobotConfig, choose
 from follow_env.env import FollowEnv, _pose
-from follow_env.person.bodies import load_body
 from follow_env.reward import SET_POINT, reward_terms
 from follow_env.routes import Route, choose_route, make_route
 from follow_env.vector.episode import CHEST_HEIGHT
 from follow_env.vector.kernels import BEGIN, SKIP, STEP, play
 from follow_env.vector.philox import keys
-from follow_env.vector.pictures import Artist, Pictures
+from follow_env.vector.pictures import Pictures
 from follow_env.vector.place import pack_place
 from follow_env.vector.records import COLLISIONS, INFO, MOST_TURNS, ROUTE_NUMBERS, WORLD, pack_settings
 
@@ -90,19 +88,13 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         threads = threads or os.cpu_count() or 1
         self._ranges = _shares(num_envs, min(threads, max(num_envs // WORLDS_PER_THREAD, 1)))
         self._pictures: Pictures | None = None
-        self._artists: list[Artist] = []
+        parts = len(self._ranges)
         with announced("the worlds"):
             self._play(0, 0, np.zeros(num_envs, np.int8), np.zeros((num_envs, 2)), *self._outcome())
             if self._settings["pictures"][0]:
-                self._picture_ranges = _shares(num_envs, min(threads, num_envs))
-                self._pictures = Pictures(num_envs, single.camera, single._delay)
-                body = load_body(*single._dressed)
-                for _ in self._picture_ranges:
-                    artist = Artist(single.scene, single.camera, single.robot_config, single._sensor, body)
-                    artist.draw(self._worlds[0])  # compiles what it needs, before threads meet there
-                    self._artists.append(artist)
-        most = max(len(self._ranges), len(self._artists))
-        self._pool = ThreadPoolExecutor(most - 1) if most > 1 else None
+                parts = min(threads, num_envs)
+                self._pictures = Pictures(single, self._worlds, _shares(num_envs, parts))
+        self._pool = ThreadPoolExecutor(parts - 1) if parts > 1 else None
 
     def reset(
         self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
@@ -200,11 +192,10 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         if self._pictures is None:
             self._observations = observations.copy()
             return observations, info
-        rgb, depth = self._pictures.observed(self._worlds)
+        colours, depth = self._pictures.observed()
         if self._single._obs == "rgbd_uint8":
-            info |= {"depth": depth, "_depth": mask}
-            return packed(rgb, depth), info
-        return {"rgb": rgb, "depth": depth, "twist": infos["twist"].astype(np.float32)}, info
+            return colours, info | {"depth": depth, "_depth": mask}
+        return {"rgb": colours, "depth": depth, "twist": infos["twist"].astype(np.float32)}, info
 
     def _outcome(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return fresh arrays for observations, infos, rewards, terminated and truncated."""
@@ -220,9 +211,8 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
                 f"no route of 12 m with turns of 20-50 deg fits the scene {self._single.scene.name!r} in {failures} "
                 "worlds; widen its free lane"
             )
-        if self._pictures is not None:
-            drawers = zip(self._picture_ranges, self._artists, strict=True)
-            self._share([partial(self._pictures.take, *ends, todo, self._worlds, artist) for ends, artist in drawers])
+        if self._pictures is not None and not all(self._share(self._pictures.jobs(todo))):
+            raise ValueError("a person has a vertex that is not finite; expected world coordinates in metres")
 
     def _share(self, jobs: list[Callable[[], Any]]) -> list[Any]:
         """Do the jobs, the first in this thread, and return what they return."""

@@ -6,7 +6,6 @@ once. The rooms: `raster_scene` packs the scene, `raster_setup` and `raster_peop
 draws tiles, `raster_shade` colours them.
 """
 
-import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
@@ -16,10 +15,9 @@ import numpy as np
 from follow_env.camera.frame import RGBDFrame
 from follow_env.camera.mesh import Mesh, Placed
 from follow_env.camera.pinhole import CameraPose, PinholeCamera
-from follow_env.camera.raster_fill import TILE
 from follow_env.camera.raster_kernels import announced, draw, halve
 from follow_env.camera.raster_scene import pack_scene
-from follow_env.camera.raster_work import PeoplePack, View, Workspace, make_workspace
+from follow_env.camera.raster_work import PeoplePack, View, Workspace, make_view, make_workspace, pack_people
 from follow_env.scene import Scene
 
 
@@ -45,7 +43,7 @@ class RasterRenderer:
         self._scene = pack_scene(scene)
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self._meshes: list[tuple[Mesh, int]] = []
-        self._people, self._workspaces = self._pack_people(())
+        self._people, self._workspaces = self._pack([])
         shape = (camera.height * 2, camera.width * 2) if self._supersample == 2 else (0, 0)
         self._fine = RGBDFrame(np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32), np.empty(shape, np.uint8))
         self._warm = False
@@ -84,38 +82,14 @@ class RasterRenderer:
         return RGBDFrame(np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32), np.empty(shape, np.uint8))
 
     def _render_into(self, frame: RGBDFrame, camera: CameraPose, people: Sequence[Placed]) -> None:
-        view = self._view(camera, 1)
+        view = make_view(self._camera, camera, 1)
         self._place(people)
         with nullcontext() if self._warm else announced("the camera"):
             if self._supersample == 2:
-                self._draw(self._view(camera, 2), True, self._fine)
+                self._draw(make_view(self._camera, camera, 2), True, self._fine)
                 halve(self._fine.rgb, frame.rgb)
             self._draw(view, self._supersample == 1, frame)
         self._warm = True
-
-    def _view(self, pose: CameraPose, scale: int) -> View:
-        if not all(map(math.isfinite, (pose.x, pose.y, pose.z, pose.yaw))):
-            raise ValueError(f"the camera's pose is {pose!r}; expected finite numbers in metres and radians")
-        camera = self._camera
-        width, height, step = scale * camera.width, scale * camera.height, 1.0 / (scale * camera.focal)
-        return View(
-            float(pose.x),
-            float(pose.y),
-            float(pose.z),
-            math.cos(pose.yaw),
-            math.sin(pose.yaw),
-            float(camera.config.near),
-            float(camera.config.far),
-            0.5 * width * step,
-            0.5 * height * step,
-            (0.5 - 0.5 * width) * step,
-            (0.5 - 0.5 * height) * step,
-            step,
-            width,
-            height,
-            -(-width // TILE),
-            -(-height // TILE),
-        )
 
     def _place(self, people: Sequence[Placed]) -> None:
         """Copy the people's vertices; pack the rest again only when other meshes or ids come."""
@@ -124,7 +98,7 @@ class RasterRenderer:
             new[0] is old[0] and new[1] == old[1] for new, old in zip(meshes, self._meshes, strict=True)
         )
         if not same:
-            self._people, self._workspaces = self._pack_people(people)
+            self._people, self._workspaces = self._pack(meshes)
             self._meshes = meshes
         first = 0
         for person in people:
@@ -133,26 +107,10 @@ class RasterRenderer:
             self._people.normals[first:last] = person.normals
             first = last
 
-    def _pack_people(self, people: Sequence[Placed]) -> tuple[PeoplePack, list[Workspace]]:
-        meshes = [person.mesh for person in people]
-        sizes = np.array([(0, 0), *((len(m.anchors), len(m.faces)) for m in meshes)], np.int64)
-        starts = np.cumsum(sizes, axis=0)
-        vertices, faces = (int(n) for n in starts[-1])
-        none = np.zeros((0, 3), np.float32)
-        pack = PeoplePack(
-            np.zeros((vertices, 3), np.float32),
-            np.zeros((vertices, 3), np.float32),
-            np.concatenate(
-                [np.zeros((0, 3), np.int32), *(m.faces + np.int32(s[0]) for m, s in zip(meshes, starts, strict=False))]
-            ),
-            np.concatenate([none, *(m.colours for m in meshes)]),
-            np.concatenate([np.zeros(0, np.uint8), *(m.pattern for m in meshes)]),
-            np.concatenate([np.zeros(0, np.bool_), *(m.near_border for m in meshes)]),
-            np.concatenate([none, *(m.anchors for m in meshes)]),
-            np.repeat(np.array([p.id for p in people], np.uint8), sizes[1:, 1]),
-            starts,
-        )
-        return pack, [make_workspace(self._scene, vertices, faces) for _ in range(self._threads)]
+    def _pack(self, meshes: list[tuple[Mesh, int]]) -> tuple[PeoplePack, list[Workspace]]:
+        people = pack_people(meshes)
+        sizes = len(people.vertices), len(people.faces)
+        return people, [make_workspace(self._scene, *sizes) for _ in range(self._threads)]
 
     def _draw(self, view: View, coloured: bool, frame: RGBDFrame) -> None:
         """Draw the rows of tiles, one band a thread."""

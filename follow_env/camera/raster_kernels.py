@@ -3,7 +3,7 @@
 
 import sys
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -26,19 +26,19 @@ from follow_env.camera.raster_fill import (
 from follow_env.camera.raster_people import find_triangles
 from follow_env.camera.raster_scene import CYLINDER_PARTS, FACES
 from follow_env.camera.raster_setup import find_balls, find_cylinders, find_facets
-from follow_env.camera.raster_shade import BACKGROUND, shade_surface, shade_triangle
+from follow_env.camera.raster_shade import BACKGROUND, shade_surface, shade_triangles
 
 
-def _digest() -> int:
-    """Return a checksum of the kernels' sources.
+def digest(paths: Iterable[Path]) -> int:
+    """Return a checksum of the sources of a compiled function.
 
-    Numba's cache looks only at the file of the cached function itself. The checksum is a closure variable of `draw`,
-    and so part of its cache key: a change in any of the other files is noticed as well.
+    Numba's cache looks only at the file of the cached function itself. As a closure variable of it the checksum is part
+    of its cache key: a change in any of the other files is noticed as well.
     """
-    digest = 0
-    for path in sorted([*Path(__file__).parent.glob("raster_*.py"), Path(__file__).parent / "textures.py"]):
-        digest = zlib.crc32(path.read_bytes(), digest)
-    return digest
+    result = 0
+    for path in sorted(paths):
+        result = zlib.crc32(path.read_bytes(), result)
+    return result
 
 
 def _compiled(sources: int) -> Callable[..., int]:
@@ -59,31 +59,60 @@ def _compiled(sources: int) -> Callable[..., int]:
             ids: (H, W) uint8, out.
         """
         key = sources  # noqa: F841  captured, hence part of the cache key
-        facets = find_facets(view, scene.boxes, work)
-        rounds = find_cylinders(view, scene.cylinders, work)
-        balls = find_balls(view, scene.balls, work)
-        triangles = find_triangles(view, people, scene, work)
-        if triangles < 0:
+        facet_count = find_facets(view, scene.boxes, work)
+        cylinder_count = find_cylinders(view, scene.cylinders, work)
+        ball_count = find_balls(view, scene.balls, work)
+        triangle_count = find_triangles(view, people, scene, work)
+        if triangle_count < 0:
             return -1
-        starts, entries = _sort_into_tiles(triangles, view, work.triangle_places)
+        lanes, seen, colours, done = work.lanes, work.seen, work.colours, work.done
+        facets, places, order, in_row = work.facets, work.places, work.order, work.row
+        cylinders, cylinder_places, balls, ball_places = work.rounds, work.round_places, work.balls, work.ball_places
+        triangles, triangle_places = work.triangles, work.triangle_places
+        surfaces, textures, lamps = scene.surfaces, scene.textures, scene.lamps
+        names, pattern, albedo = people.ids, people.pattern, people.colours
+        first_cylinder = 1 + FACES * scene.boxes.shape[0]
+        first_ball = first_cylinder + CYLINDER_PARTS * scene.cylinders.shape[0]
+        static = surfaces.shape[0]
+        background, limit, far = np.float32(1.0 / view.far), np.float32(1.0 / view.near), np.float32(view.far)
+        starts, entries = _sort_into_tiles(triangle_count, view, triangle_places)
         for row in range(first_row, last_row):
             count = 0
-            for k in range(facets):
-                f = work.order[k]
-                if work.places[f, 3] <= row <= work.places[f, 4]:
-                    work.row[count] = f
+            for k in range(facet_count):
+                f = order[k]
+                if places[f, 3] <= row <= places[f, 4]:
+                    in_row[count] = f
                     count += 1
+            height, top = min(TILE, view.height - row * TILE), view.top + row * TILE * view.step
             for column in range(view.columns):
+                width, left = min(TILE, view.width - column * TILE), view.left + column * TILE * view.step
                 n = row * view.columns + column
-                inside = entries[starts[n] : starts[n + 1]]
-                _fill_tile(row, column, view, scene, work, count, rounds, balls, inside)
-                _write_tile(row, column, view, scene, people, work, inside.size, coloured, rgb, depth, ids)
+                start, stop = starts[n], starts[n + 1]
+                clear(lanes, seen, left, top, view.step, background)
+                floor = _fill_facets(column, facets, places, in_row, count, lanes, seen, limit, background)
+                given = lanes, seen, view.near, floor
+                _fill_cylinders(row, column, cylinders, cylinder_places, cylinder_count, first_cylinder, *given)
+                _fill_balls(row, column, balls, ball_places, ball_count, first_ball, *given)
+                _fill_triangles(row, triangles, triangle_places, entries, start, stop, static, lanes, seen, limit)
+                for k in range(PIXELS):
+                    lanes[DISTANCE + k] = np.float32(1.0) / lanes[DEPTH + k] if seen[k] else far
+                place = np.uint64(row * TILE), np.uint64(column * TILE), np.uint64(height), np.uint64(width)
+                _write_depth(*place, lanes, depth)
+                _write_ids(*place, stop > start, static, triangle_places, names, seen, ids)
+                if not coloured:
+                    continue
+                if stop > start:
+                    looks = triangle_places, pattern, albedo, triangles
+                    shade_triangles(height, width, static, *looks, lanes, seen, colours)
+                lit = surfaces, textures, lamps, scene.ambient
+                _shade_surfaces(height, width, view, *lit, done, lanes, seen, colours)
+                _write_colours(*place, colours, rgb)
         return 0
 
     return draw
 
 
-# Inlined by force: handing over a record of arrays costs more than drawing a tile.
+# Inlined by force, and given single arrays: numba counts references to those of a record by atomic operations.
 _inline = njit(nogil=True, error_model="numpy", forceinline=True)
 
 
@@ -109,60 +138,54 @@ def _sort_into_tiles(triangles, view, places):
 
 
 @_inline
-def _fill_tile(row, column, view, scene, work, count, rounds, balls, inside):
-    """Find what a tile sees of the first `count` facets of `work.row`, cylinders, balls, the triangles `inside`."""
-    lanes, seen = work.lanes, work.seen
-    background, limit = np.float32(1.0 / view.far), np.float32(1.0 / view.near)
-    left, top = view.left + column * TILE * view.step, view.top + row * TILE * view.step
-    clear(lanes, seen, left, top, view.step, background)
-    facets, places, order = work.facets, work.places, work.row
-    floor = background
+def _fill_facets(column, facets, places, in_row, count, lanes, seen, limit, floor):
+    """Draw the first `count` facets of `in_row` into a tile; return the least 1/Z that it now has for certain."""
     for k in range(count):
-        f = order[k]
+        f = in_row[k]
         if places[f, 1] <= column <= places[f, 2]:
             floor = fill_facet(facets, f, places[f, 0], lanes, seen, limit, floor)
-    first = 1 + FACES * scene.boxes.shape[0]
-    cylinders, places = work.rounds, work.round_places
-    for k in range(rounds):
+    return floor
+
+
+@_inline
+def _fill_cylinders(row, column, cylinders, places, count, first, lanes, seen, near, floor):
+    """Draw cylinders, whose numbers begin at `first`, into a tile; what lies behind 1/Z = `floor` is left out."""
+    for k in range(count):
         met = places[k, 1] <= column <= places[k, 2] and places[k, 3] <= row <= places[k, 4]
         if met and cylinders[k, 5] > floor:
-            fill_cylinder(cylinders, k, np.int32(first + CYLINDER_PARTS * places[k, 0]), lanes, seen, view.near)
-    first += CYLINDER_PARTS * scene.cylinders.shape[0]
-    records, places = work.balls, work.ball_places
-    for k in range(balls):
+            fill_cylinder(cylinders, k, np.int32(first + CYLINDER_PARTS * places[k, 0]), lanes, seen, near)
+
+
+@_inline
+def _fill_balls(row, column, balls, places, count, first, lanes, seen, near, floor):
+    """Draw balls, whose numbers begin at `first`, into a tile; what lies behind 1/Z = `floor` is left out."""
+    for k in range(count):
         met = places[k, 1] <= column <= places[k, 2] and places[k, 3] <= row <= places[k, 4]
-        if met and records[k, 6] > floor:
-            fill_ball(records, k, np.int32(first + places[k, 0]), lanes, seen, view.near)
-    first = scene.surfaces.shape[0]
-    triangles, places = work.triangles, work.triangle_places
-    for t in inside:
+        if met and balls[k, 6] > floor:
+            fill_ball(balls, k, np.int32(first + places[k, 0]), lanes, seen, near)
+
+
+@_inline
+def _fill_triangles(row, triangles, places, entries, start, stop, first, lanes, seen, limit):
+    """Draw the triangles `entries[start:stop]`, whose numbers begin at `first`, into a tile."""
+    for n in range(start, stop):
+        t = entries[n]
         upper, lower = max(places[t, 3] - row * TILE, 0), min(places[t, 4] - row * TILE, TILE - 1)
         fill_triangle(triangles, t, upper, lower, np.int32(first + t), lanes, seen, limit)
 
 
 @_inline
-def _colour_tile(height, width, view, scene, people, work):
-    """Write the colours of the first `height` rows and `width` columns of a tile into `work.colours`.
+def _shade_surfaces(height, width, view, surfaces, textures, lamps, ambient, done, lanes, seen, colours):
+    """Colour the pixels of the first `height` rows and `width` columns that see the scene or nothing.
 
-    A surface of the scene is shaded once, from the first to the last row that shows it.
+    A surface is shaded once, from the first to the last row that shows it.
     """
-    lanes, seen, colours, triangles, places = work.lanes, work.seen, work.colours, work.triangles, work.triangle_places
-    pattern, albedo = people.pattern, people.colours
-    surfaces, textures, lamps, ambient = scene.surfaces, scene.textures, scene.lamps, scene.ambient
-    static = surfaces.shape[0]
-    done, number_done = work.done, 0
+    number_done = 0
     previous = np.int32(-1)
     for i in range(height):
-        for j in range(width):
-            k = np.uint64(i * TILE + j)
+        for k in range(np.uint64(TILE * i), np.uint64(TILE * i + width)):
             number = seen[k]
-            if number == previous:
-                continue
-            if number >= static:
-                t = number - static
-                f = places[t, 0]
-                red, green, blue = albedo[f, 0], albedo[f, 1], albedo[f, 2]
-                colours[k] = shade_triangle(k, t, pattern[f], red, green, blue, triangles, lanes)
+            if number == previous or number >= surfaces.shape[0]:
                 continue
             if number == 0:
                 colours[k] = BACKGROUND
@@ -191,38 +214,39 @@ def _last_row(seen, number, first, height):
 
 
 @_inline
-def _write_tile(row, column, view, scene, people, work, triangles, coloured, rgb, depth, ids):
-    """Copy a tile, in which `triangles` may be seen, to the picture."""
-    lanes, seen, colours, places, names = work.lanes, work.seen, work.colours, work.triangle_places, people.ids
-    x0, y0 = np.uint64(column * TILE), np.uint64(row * TILE)
-    width, height = min(TILE, view.width - column * TILE), min(TILE, view.height - row * TILE)
-    columns, rows = np.uint64(width), np.uint64(height)
-    static = scene.surfaces.shape[0]
-    far = np.float32(view.far)
-    for k in range(PIXELS):
-        lanes[DISTANCE + k] = np.float32(1.0) / lanes[DEPTH + k] if seen[k] else far
+def _write_depth(y0, x0, rows, columns, lanes, depth):
+    """Copy a tile's distances to its place in the picture."""
     for i in range(rows):
         for j in range(columns):
             depth[y0 + i, x0 + j] = lanes[DISTANCE + np.uint64(TILE) * i + j]
+
+
+@_inline
+def _write_ids(y0, x0, rows, columns, any_triangle, first, places, names, seen, ids):
+    """Write who is seen to a tile's place in the picture."""
+    for i in range(rows):
         for j in range(columns):
             ids[y0 + i, x0 + j] = 0
-    if triangles:
+    if any_triangle:
         for i in range(rows):
             for j in range(columns):
                 number = seen[np.uint64(TILE) * i + j]
-                if number >= static:
-                    ids[y0 + i, x0 + j] = names[places[number - static, 0]]
-    if coloured:
-        _colour_tile(height, width, view, scene, people, work)
-        for i in range(rows):
-            for j in range(columns):
-                colour = colours[np.uint64(TILE) * i + j]
-                rgb[y0 + i, x0 + j, 0] = np.uint8(colour)
-                rgb[y0 + i, x0 + j, 1] = np.uint8(colour >> np.uint32(8))
-                rgb[y0 + i, x0 + j, 2] = np.uint8(colour >> np.uint32(16))
+                if number >= first:
+                    ids[y0 + i, x0 + j] = names[places[number - first, 0]]
 
 
-draw = _compiled(_digest())
+@_inline
+def _write_colours(y0, x0, rows, columns, colours, rgb):
+    """Copy a tile's colours to its place in the picture."""
+    for i in range(rows):
+        for j in range(columns):
+            colour = colours[np.uint64(TILE) * i + j]
+            rgb[y0 + i, x0 + j, 0] = np.uint8(colour)
+            rgb[y0 + i, x0 + j, 1] = np.uint8(colour >> np.uint32(8))
+            rgb[y0 + i, x0 + j, 2] = np.uint8(colour >> np.uint32(16))
+
+
+draw = _compiled(digest([*Path(__file__).parent.glob("raster_*.py"), Path(__file__).parent / "textures.py"]))
 
 
 @njit(cache=True, nogil=True)

@@ -17,6 +17,7 @@ from follow_env.camera.raster_fill import (
     POINT_Z,
     SHADE,
     SHARP,
+    TILE,
     S,
     T,
     X,
@@ -38,11 +39,17 @@ _jit = njit(nogil=True, error_model="numpy")
 
 
 @_jit
-def lamp_light(dx, dy, dz, nx, ny, nz, strength):
-    """Return the light of one lamp at the offset (dx, dy, dz) m from a surface with this unit normal."""
+def lamp_lights(dx, dy, dz, nx, ny, nz, strength):
+    """Return the light of one lamp at the offset (dx, dy, dz) m on both sides of a surface with this unit normal."""
     q = _ONE / math.sqrt(((dx * dx + dy * dy) + dz * dz) + SOFT)
-    facing = max(((nx * dx + ny * dy) + nz * dz) * q, _ZERO)
-    return strength * (q * q) * (BOUNCE + DIRECT * facing)
+    facing, full = ((nx * dx + ny * dy) + nz * dz) * q, strength * (q * q)
+    return full * (BOUNCE + DIRECT * max(facing, _ZERO)), full * (BOUNCE + DIRECT * max(-facing, _ZERO))
+
+
+@_jit
+def lamp_light(dx, dy, dz, nx, ny, nz, strength):
+    """Return the light of one lamp on the side of a surface that its normal points to: see `lamp_lights`."""
+    return lamp_lights(dx, dy, dz, nx, ny, nz, strength)[0]
 
 
 @_jit
@@ -101,21 +108,32 @@ def shade_surface(number, first, last, view, surfaces, texture, lamps, ambient, 
 
 
 @_jit
-def shade_triangle(k, t, kind, red, green, blue, triangles, lanes):
-    """Return the colour of pixel k (uint64), which sees triangle t of this pattern and albedo."""
-    x, y, distance = lanes[X + k], lanes[Y + k], lanes[DISTANCE + k]
-    light = max((triangles[t, 12] * x + triangles[t, 13] * y + triangles[t, 14]) * distance, _ZERO) * _FULL
-    if kind:
-        az = (triangles[t, 21] * x + triangles[t, 22] * y + triangles[t, 23]) * distance
-        if kind == 1:
-            odd = np.int32(az * _STRIPE + _SHIFT)
-        else:
-            ax = (triangles[t, 15] * x + triangles[t, 16] * y + triangles[t, 17]) * distance
-            ay = (triangles[t, 18] * x + triangles[t, 19] * y + triangles[t, 20]) * distance
-            odd = np.int32(ax * _CHECK + _SHIFT) + np.int32(ay * _CHECK + _SHIFT) + np.int32(az * _CHECK + _SHIFT)
-        if odd & 1:
-            light *= _DARK
-    return _colour(red * light, green * light, blue * light)
+def shade_triangles(height, width, static, places, pattern, albedo, triangles, lanes, seen, colours):
+    """Colour the pixels of the first `height` rows and `width` columns that see a triangle: number `static` and above.
+
+    One loop in one call: numba counts references to the arrays of a call by atomic operations.
+    """
+    for i in range(height):
+        for k in range(np.uint64(TILE * i), np.uint64(TILE * i + width)):
+            if seen[k] < static:
+                continue
+            t = np.uint64(seen[k] - static)
+            f = np.uint64(places[t, 0])
+            kind = pattern[f]
+            x, y, distance = lanes[X + k], lanes[Y + k], lanes[DISTANCE + k]
+            light = max((triangles[t, 12] * x + triangles[t, 13] * y + triangles[t, 14]) * distance, _ZERO) * _FULL
+            odd = np.int32(0)
+            if kind:
+                az = (triangles[t, 21] * x + triangles[t, 22] * y + triangles[t, 23]) * distance
+                if kind == 1:
+                    odd = np.int32(az * _STRIPE + _SHIFT)
+                else:
+                    ax = (triangles[t, 15] * x + triangles[t, 16] * y + triangles[t, 17]) * distance
+                    ay = (triangles[t, 18] * x + triangles[t, 19] * y + triangles[t, 20]) * distance
+                    odd = np.int32(np.int32(ax * _CHECK + _SHIFT) + np.int32(ay * _CHECK + _SHIFT))
+                    odd = np.int32(odd + np.int32(az * _CHECK + _SHIFT))
+            light = light * _DARK if odd & np.int32(1) else light
+            colours[k] = _colour(albedo[f, 0] * light, albedo[f, 1] * light, albedo[f, 2] * light)
 
 
 @_jit

@@ -12,10 +12,11 @@ from follow_env.camera.raster_kernels import announced
 from follow_env.camera.sensor_kernels import (
     NORMAL_BITS,
     SHIFT_BITS,
+    ColourModel,
     DepthModel,
-    DepthWork,
-    corrupt_colour,
-    corrupt_depth,
+    SensorModel,
+    corrupt,
+    make_work,
     pack_bytes,
 )
 from follow_env.config import ColourConfig, DepthConfig
@@ -53,7 +54,7 @@ class RGBDSensor:
         height, width, scale = camera.height, camera.width, camera.width / NATIVE_WIDTH
         focal_baseline, step, far = camera.focal * depth.baseline, depth.disparity_step * scale, camera.config.far
         real = np.float32
-        self._model = DepthModel(
+        dials = DepthModel(
             focal=real(camera.focal),
             focal_baseline=real(focal_baseline),
             axial=real(depth.axial_noise),
@@ -73,24 +74,15 @@ class RGBDSensor:
             band=depth.edge_band,
         )
         sigma = depth.lateral_noise * scale
-        self._normal = _quantiles(NORMAL_BITS).astype(np.float32)
-        self._shift = np.rint(sigma * _quantiles(SHIFT_BITS)).astype(np.int32)
-        self._work = DepthWork(
-            np.empty((height, width), np.float32),
-            np.empty(width, np.float32),
-            np.empty((5, width + 2 * max(depth.edge_band, 1)), np.float32),
-            np.empty((2, width), np.uint32),
-            np.empty(width, np.int32),
+        taps = _gaussian_taps(colour.blur * scale)
+        exact = taps.size == 1 and colour.gain == 1.0 and not (colour.read_noise or colour.shot_noise)
+        self.model = SensorModel(
+            dials,
+            ColourModel(real(colour.gain), real(colour.read_noise), real(colour.shot_noise), taps, exact),
+            _quantiles(NORMAL_BITS).astype(np.float32),
+            np.rint(sigma * _quantiles(SHIFT_BITS)).astype(np.int32),
         )
-        self._taps = _gaussian_taps(colour.blur * scale)
-        self._gain, self._read, self._shot = (
-            np.float32(v) for v in (colour.gain, colour.read_noise, colour.shot_noise)
-        )
-        self._exact_colour = (
-            self._taps.size == 1 and colour.gain == 1.0 and not (colour.read_noise or colour.shot_noise)
-        )
-        self._colour_rows = np.empty((2, 3 * (width + 2 * self._taps.size - 2)), np.float32)
-        self._colour_bits = np.empty(3 * width, np.uint32)
+        self.work = make_work(height, width, self.model)
         self._warm = False
 
     def corrupt(self, frame: RGBDFrame, seed: int) -> RGBDFrame:
@@ -99,15 +91,10 @@ class RGBDSensor:
         Depth not above 0 or not finite is no reading, 0. With colour errors off the colours are those of `frame`, not
         copied.
         """
-        key = np.array((seed & 0xFFFFFFFF, seed >> 32), np.uint32)
-        depth = np.empty_like(frame.depth)
+        true, colours = np.ascontiguousarray(frame.depth), np.ascontiguousarray(frame.rgb)
+        depth, rgb = np.empty_like(true), colours if self.model.colour.exact else np.empty_like(colours)
         with nullcontext() if self._warm else announced("the camera"):
-            corrupt_depth(frame.depth, frame.rgb, key, self._model, self._normal, self._shift, self._work, depth)
-            rgb = frame.rgb
-            if not self._exact_colour:
-                rgb = np.empty_like(rgb)
-                noise = self._gain, self._read, self._shot
-                corrupt_colour(frame.rgb, key, *noise, self._taps, self._colour_rows, self._colour_bits, rgb)
+            corrupt(true, colours, np.uint64(seed), self.model, self.work, depth, rgb)
         self._warm = True
         return RGBDFrame(rgb, depth, frame.ids)
 

@@ -57,7 +57,7 @@ def skin(
     rotations: np.ndarray,
     positions: np.ndarray,
     joints: np.ndarray,
-    placement: np.ndarray,
+    placement: np.ndarray | tuple[float, ...],
     vertices: np.ndarray,
 ) -> None:
     """Write the vertices (V, 3) in the world frame.
@@ -95,10 +95,10 @@ def skin(
         for k in range(4):
             w = weights[v, k]
             if w > 0.0:
-                m = moves[bones[v, k]]
-                sx += w * (m[0, 0] * px + m[0, 1] * py + m[0, 2] * pz + m[0, 3])
-                sy += w * (m[1, 0] * px + m[1, 1] * py + m[1, 2] * pz + m[1, 3])
-                sz += w * (m[2, 0] * px + m[2, 1] * py + m[2, 2] * pz + m[2, 3])
+                bone = np.uint64(bones[v, k])
+                sx += w * (moves[bone, 0, 0] * px + moves[bone, 0, 1] * py + moves[bone, 0, 2] * pz + moves[bone, 0, 3])
+                sy += w * (moves[bone, 1, 0] * px + moves[bone, 1, 1] * py + moves[bone, 1, 2] * pz + moves[bone, 1, 3])
+                sz += w * (moves[bone, 2, 0] * px + moves[bone, 2, 1] * py + moves[bone, 2, 2] * pz + moves[bone, 2, 3])
         vertices[v, 0] = sx
         vertices[v, 1] = sy
         vertices[v, 2] = sz
@@ -109,14 +109,14 @@ def smooth_normals(vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray)
     """Write unit normals (V, 3) float32: the mean of the faces around a vertex, weighted by their area."""
     normals[:] = 0.0
     for f in range(len(faces)):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        a, b, c = np.uint64(faces[f, 0]), np.uint64(faces[f, 1]), np.uint64(faces[f, 2])
         ux, uy, uz = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2]
         vx, vy, vz = vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2]
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        for v in (a, b, c):
-            normals[v, 0] += nx
-            normals[v, 1] += ny
-            normals[v, 2] += nz
+        for corner in (a, b, c):
+            normals[corner, 0] += nx
+            normals[corner, 1] += ny
+            normals[corner, 2] += nz
     for v in range(len(normals)):
         nx, ny, nz = normals[v, 0], normals[v, 1], normals[v, 2]
         length = math.sqrt(nx * nx + ny * ny + nz * nz)

@@ -8,12 +8,19 @@ and shin. Phase 0 is the left foot's heel strike. Lengths in m, angles in rad, f
 """
 
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
 
 from follow_env.person.skinning import chain, multiply, rotation_matrix
 
+FULL_WALK = 0.2
+"""Speed from which the steps have their full length, m/s; below, standing blends into walking and feet may slide."""
+JOG_FROM, JOG_AT = 1.15, 1.6
+"""Speeds between which walking blends into jogging, m/s."""
+JOG_SHARE = 0.6
+"""Share of the run clip in a jog: at 1.6 m/s nobody sprints."""
 WALK_DUTY, JOG_DUTY = 0.62, 0.44
 """Share of the cycle that a foot is on the floor."""
 STRIKE_PITCH, PUSH_PITCH = 0.32, 0.74
@@ -37,6 +44,37 @@ HIPS, LOWER_BACK, SPINE, CHEST, NECK, NECK_UPPER, HEAD = range(7)
 SHOULDER, ARM, FOREARM, HAND, THIGH, SHIN, FOOT, TOES = range(8)
 LEFT, RIGHT = 7, 15
 """First bone of each side, to which SHOULDER .. TOES are added."""
+
+
+class Figure(NamedTuple):
+    """What the gait knows of a body of J bones.
+
+    Attributes:
+        stride: distance of a cycle, m.
+        drops: (3,) how far the pelvis rides below its rest height in standing, walking and jogging, m.
+        joints: (J, 3) at rest.
+        parents: (J,).
+        hang: (2, 2, 3, 3) left and right, rotation of upper arm and forearm from rest to hanging down.
+        leg_frames: (2, 2, 3, 3) left and right, rest frames of thigh and shin (see `_aim`).
+        stand: (5, 4) rotations of pelvis, chest, head, left upper arm and left forearm in standing.
+        foot: heel x, toe joint x, toe joint z, ankle z (from the ankle in x, from the floor in z), standing ankle x, y
+            and walking ankle y.
+        sole: (N, 3) points of the left sole: x and z from the ankle, share of the toes.
+        trunk_clips: (2, P, 22) rotations (5, 4) and the pelvis' shift left and up, of both clips.
+        foot_clips: (2, P, 4) left ankle x and y, foot pitch, stride, of both clips.
+    """
+
+    stride: float
+    drops: np.ndarray
+    joints: np.ndarray
+    parents: np.ndarray
+    hang: np.ndarray
+    leg_frames: np.ndarray
+    stand: np.ndarray
+    foot: np.ndarray
+    sole: np.ndarray
+    trunk_clips: np.ndarray
+    foot_clips: np.ndarray
 
 
 @numba.njit(cache=True)
@@ -180,45 +218,39 @@ def _aim(start: np.ndarray, end: np.ndarray, hinge: np.ndarray, rest: np.ndarray
 
 
 @numba.njit(cache=True, nogil=True)
+def walk(figure: Figure, walked: float, speed: float, rotations: np.ndarray, positions: np.ndarray) -> None:
+    """Write the pose of who has walked so far (m) at a speed (m/s): see `pose_gait`."""
+    amplitude = smooth(speed / FULL_WALK)
+    jog = smooth((speed - JOG_FROM) / (JOG_AT - JOG_FROM))
+    stand, stroll, run = figure.drops[0], figure.drops[1], figure.drops[2]
+    drop = stand + amplitude * (stroll - stand) + jog * (run - stroll)
+    pose_gait(figure, walked / figure.stride, amplitude, JOG_SHARE * jog, drop, rotations, positions)
+
+
+@numba.njit(cache=True, nogil=True)
 def pose_gait(
+    figure: Figure,
     phase: float,
     amplitude: float,
     jog: float,
-    stride: float,
     drop: float,
-    joints: np.ndarray,
-    parents: np.ndarray,
-    hang: np.ndarray,
-    leg_frames: np.ndarray,
-    stand: np.ndarray,
-    foot: np.ndarray,
-    sole: np.ndarray,
-    trunk_clips: np.ndarray,
-    foot_clips: np.ndarray,
     rotations: np.ndarray,
     positions: np.ndarray,
 ) -> float:
     """Write the pose at a phase; return by how much the pelvis could rise (negative: it was lowered by that).
 
     Args:
+        figure: who walks; its `drops` are not read.
         phase: of the cycle, in cycles.
         amplitude: 0 = standing, 1 = walking.
         jog: 0 = walking, 1 = the run clip.
-        stride: distance of a cycle, m.
         drop: of the pelvis below its rest height, m.
-        joints: (J, 3) at rest.
-        parents: (J,).
-        hang: (2, 2, 3, 3) left and right, rotation of upper arm and forearm from rest to hanging down.
-        leg_frames: (2, 2, 3, 3) left and right, rest frames of thigh and shin (see `_aim`).
-        stand: (5, 4) rotations of pelvis, chest, head, left upper arm and left forearm in standing.
-        foot: heel x, toe joint x, toe joint z, ankle z (from the ankle in x, from the floor in z), standing ankle x, y
-            and walking ankle y.
-        sole: (N, 3) points of the left sole: x and z from the ankle, share of the toes.
-        trunk_clips: (2, P, 22) rotations (5, 4) and the pelvis' shift left and up, of both clips.
-        foot_clips: (2, P, 4) left ankle x and y, foot pitch, stride, of both clips.
         rotations: output (J, 3, 3), body frame.
         positions: output (J, 3), body frame.
     """
+    stride, joints, foot, sole = figure.stride, figure.joints, figure.foot, figure.sole
+    hang, leg_frames, stand = figure.hang, figure.leg_frames, figure.stand
+    trunk_clips, foot_clips = figure.trunk_clips, figure.foot_clips
     thigh = _distance(joints[LEFT + THIGH], joints[LEFT + SHIN])
     shin = _distance(joints[LEFT + SHIN], joints[LEFT + FOOT])
     leg = thigh + shin
@@ -296,7 +328,7 @@ def pose_gait(
         hinge = _bend(hips[side], ankles[side], thigh, shin, knee)
         _aim(hips[side], knee, hinge, leg_frames[side, 0], rotations[first + THIGH])
         _aim(knee, ankles[side], hinge, leg_frames[side, 1], rotations[first + SHIN])
-    chain(rotations, root, joints, parents, positions)
+    chain(rotations, root, joints, figure.parents, positions)
     return room
 
 

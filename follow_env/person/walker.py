@@ -10,12 +10,6 @@ from follow_env.person import postures, stride
 from follow_env.person.bodies import ASSETS, Body
 from follow_env.person.skinning import chain, multiply, skin, smooth_normals
 
-FULL_WALK = 0.2
-"""Speed from which the steps have their full length, m/s; below, standing blends into walking and feet may slide."""
-JOG_FROM, JOG_AT = 1.15, 1.6
-"""Speeds between which walking blends into jogging, m/s."""
-JOG_SHARE = 0.6
-"""Share of the run clip in a jog: at 1.6 m/s nobody sprints."""
 POSTURES = ("walk", "stand", *postures.POSTURES)
 """Names that `Walker.place` takes."""
 
@@ -42,10 +36,10 @@ class Walker:
         with np.load(ASSETS / "gait.npz") as table:
             self.stride = float(table["walk_stride"]) * (thigh + shin)
             clips = ("walk", "run")
-            self._trunk_clips = np.stack(
+            trunk_clips = np.stack(
                 [np.concatenate([table[f"{c}_rotations"].reshape(-1, 20), table[f"{c}_pelvis"]], axis=1) for c in clips]
             )
-            self._foot_clips = np.stack(
+            foot_clips = np.stack(
                 [
                     np.column_stack(
                         [
@@ -58,13 +52,22 @@ class Walker:
                 ]
             )
         spread = self._arm_spread()
-        self._hang = self._hanging(max(0.0, spread - 0.2))
-        self._stand = _standing(min(spread, 0.2))
-        self._leg_frames = self._rest_leg_frames()
-        self._foot, self._sole = self._shoe()
-        self._rotations = np.zeros((len(joints), 3, 3))
-        self._positions = np.zeros((len(joints), 3))
-        self._drops = np.array([self._needed_drop(*blend) for blend in ((0.0, 0.0), (1.0, 0.0), (1.0, JOG_SHARE))])
+        self._hang, self._leg_frames = self._hanging(max(0.0, spread - 0.2)), self._rest_leg_frames()
+        self._rotations, self._positions = np.zeros((len(joints), 3, 3)), np.zeros((len(joints), 3))
+        figure = stride.Figure(
+            self.stride,
+            np.zeros(3),
+            joints,
+            body.parents,
+            self._hang,
+            self._leg_frames,
+            _standing(min(spread, 0.2)),
+            *self._shoe(),
+            trunk_clips,
+            foot_clips,
+        )
+        blends = (0.0, 0.0), (1.0, 0.0), (1.0, stride.JOG_SHARE)
+        self.figure = figure._replace(drops=np.array([self._needed_drop(figure, *blend) for blend in blends]))
         self._held = {name: self._hold(posture) for name, posture in postures.POSTURES.items()}
 
     def place(self, x: float, y: float, heading: float, walked: float, speed: float, posture: str = "walk") -> Placed:
@@ -89,7 +92,8 @@ class Walker:
         if posture in self._held:
             rotations, positions = self._held[posture]
         else:
-            self._gait(walked / self.stride, 0.0 if posture == "stand" else speed)
+            speed = 0.0 if posture == "stand" else speed
+            stride.walk(self.figure, float(walked), float(speed), self._rotations, self._positions)
             rotations, positions = self._rotations, self._positions
         placement = np.array([x, y, 0.0, math.cos(heading), math.sin(heading)])
         return self._skinned(rotations, positions, placement, (x, y, heading))
@@ -108,36 +112,10 @@ class Walker:
         smooth_normals(vertices, mesh.faces, normals)
         return Placed(mesh, vertices, normals, self.id, pose)
 
-    def _gait(self, phase: float, speed: float) -> None:
-        amplitude = stride.smooth(speed / FULL_WALK)
-        jog = stride.smooth((speed - JOG_FROM) / (JOG_AT - JOG_FROM))
-        stand, walk, run = self._drops
-        drop = stand + amplitude * (walk - stand) + jog * (run - walk)
-        self._pose(phase, amplitude, JOG_SHARE * jog, drop)
-
-    def _pose(self, phase: float, amplitude: float, jog: float, drop: float) -> float:
-        return stride.pose_gait(
-            phase,
-            amplitude,
-            jog,
-            self.stride,
-            drop,
-            self.body.joints,
-            self.body.parents,
-            self._hang,
-            self._leg_frames,
-            self._stand,
-            self._foot,
-            self._sole,
-            self._trunk_clips,
-            self._foot_clips,
-            self._rotations,
-            self._positions,
-        )
-
-    def _needed_drop(self, amplitude: float, jog: float) -> float:
+    def _needed_drop(self, figure: stride.Figure, amplitude: float, jog: float) -> float:
         """Return how far the pelvis must ride below its rest height for both feet to be in reach at every phase."""
-        return -min(self._pose(k / 64, amplitude, jog, 0.0) for k in range(64))
+        given = (amplitude, jog, 0.0, self._rotations, self._positions)
+        return -min(stride.pose_gait(figure, k / 64, *given) for k in range(64))
 
     def _arm_spread(self) -> float:
         """Return the angle of the arms to the side at which the hands clear the hips, rad."""

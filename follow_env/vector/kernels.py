@@ -1,26 +1,22 @@
 # mypy: disable-error-code="no-untyped-def"
 """The compiled entry: `play` begins or steps a range of worlds. Worlds share nothing, so ranges may run in threads."""
 
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 
 from numba import njit
 
+from follow_env.camera.raster_kernels import digest
 from follow_env.vector.episode import begin, draw, measure, observe, report, step
 
 SKIP, BEGIN, STEP = range(3)
 """What `play` does with a world."""
 
 
-def _digest() -> int:
-    """Return a checksum of the sources that `play` is compiled from: numba's cache looks at this file only."""
+def _sources() -> list[Path]:
     here = Path(__file__).parent
-    sources = [*here.glob("*.py"), *(here.parent / f"{name}.py" for name in ("env", "physics", "reward", "routes"))]
-    digest = 0
-    for path in sorted(sources):
-        digest = zlib.crc32(path.read_bytes(), digest)
-    return digest
+    own = [path for path in here.glob("*.py") if path.stem not in ("paint", "pictures")]
+    return [*own, *(here.parent / f"{name}.py" for name in ("env", "physics", "reward", "routes"))]
 
 
 def _compiled(sources: int) -> Callable[..., int]:
@@ -98,4 +94,4 @@ def _delayed(queues, i, steps, measured):
     return old
 
 
-play = _compiled(_digest())
+play = _compiled(digest(_sources()))

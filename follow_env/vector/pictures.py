@@ -1,53 +1,22 @@
 """`Pictures`: what the robots of a batch see, rendered by threads, with the sensor's errors and its latency."""
 
-import math
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from follow_env.camera import CameraPose, PinholeCamera
-from follow_env.camera.frame import RGBDFrame
-from follow_env.camera.raster import RasterRenderer
+from follow_env.camera.pinhole import CameraPose
+from follow_env.camera.raster_scene import pack_scene
+from follow_env.camera.raster_work import make_view, make_workspace, pack_people
 from follow_env.camera.sensor import RGBDSensor
-from follow_env.config import RobotConfig, SensorConfig
-from follow_env.person.bodies import Body
+from follow_env.person.bodies import load_body
 from follow_env.person.walker import Walker
-from follow_env.scene import Scene
-from follow_env.vector.kernels import BEGIN, SKIP
+from follow_env.vector.kernels import SKIP, STEP
+from follow_env.vector.paint import Canvas, Studio, paint
 
-
-class Artist:
-    """Draws worlds one after another; one for each thread.
-
-    Args:
-        scene: the place.
-        camera: the intrinsics.
-        robot: says where the camera is.
-        sensor: the camera's errors.
-        body: the person.
-    """
-
-    def __init__(
-        self, scene: Scene, camera: PinholeCamera, robot: RobotConfig, sensor: SensorConfig, body: Body
-    ) -> None:
-        self._robot, self._drop_share = robot, sensor.frames.drop_share
-        self._renderer = RasterRenderer(scene, camera)
-        self._walker = Walker(body)
-        self._sensor = RGBDSensor(sensor.depth, sensor.colour, camera)
-
-    def drops(self, world: np.void) -> bool:
-        """Whether the picture of a world (a record `WORLD`) never arrives."""
-        if self._drop_share <= 0.0:
-            return False
-        return float(np.random.Generator(np.random.Philox(key=int(world["picture_seed"]))).random()) < self._drop_share
-
-    def draw(self, world: np.void) -> RGBDFrame:
-        """Return what the camera of a world (a record `WORLD`) reports."""
-        x, y, yaw = float(world["x"]), float(world["y"]), float(world["yaw"])
-        forward = self._robot.camera_forward
-        eye = CameraPose(x + forward * math.cos(yaw), y + forward * math.sin(yaw), self._robot.camera_height, yaw)
-        x, y, heading, *gait = (float(world[name]) for name in ("person_x", "person_y", "heading", "walked", "speed"))
-        person = self._walker.place(x, y, heading, walked=gait[0], speed=gait[1])
-        return self._sensor.corrupt(self._renderer.render(eye, (person,)), int(world["picture_seed"]))
+if TYPE_CHECKING:
+    from follow_env.env import FollowEnv
 
 
 class Pictures:
@@ -56,30 +25,75 @@ class Pictures:
     A world's first picture stands until it is old enough.
 
     Args:
-        count: number of worlds.
-        camera: the intrinsics.
-        delay: age of what is observed, steps.
+        single: the environment of which there are many.
+        worlds: (n,) `records.WORLD`.
+        ranges: of worlds, one for each thread.
     """
 
-    def __init__(self, count: int, camera: PinholeCamera, delay: int) -> None:
-        shape = (delay + 1, count, camera.height, camera.width)
+    def __init__(self, single: "FollowEnv", worlds: np.ndarray, ranges: list[tuple[int, int]]) -> None:
+        self._worlds, self._ranges = worlds, ranges
+        self._drop_share = single._sensor.frames.drop_share
+        shape = (single._delay + 1, len(worlds), single.camera.height, single.camera.width)
         self._rgb, self._depth = np.zeros((*shape, 3), np.uint8), np.zeros(shape, np.float32)
+        self._shape = (*shape[1:], 4 if single._obs == "rgbd_uint8" else 3)
+        self._studios = [_studio(single) for _ in ranges]
+        self._observed = self._blank()
+        paint(0, 0, np.zeros(0, np.int8), worlds, self._studios[0], self._rgb, self._depth, *self._observed)
 
-    def take(self, first: int, last: int, todo: np.ndarray, worlds: np.ndarray, artist: Artist) -> None:
-        """Draw the worlds first <= i < last that begin or step."""
-        slots = len(self._rgb)
-        for i in range(first, last):
-            if todo[i] == SKIP:
-                continue
-            at = slice(None) if todo[i] == BEGIN else int(worlds[i]["steps"]) % slots
-            if todo[i] != BEGIN and artist.drops(worlds[i]):
-                latest = (int(worlds[i]["steps"]) - 1) % slots
-                self._rgb[at, i], self._depth[at, i] = self._rgb[latest, i], self._depth[latest, i]
-                continue
-            frame = artist.draw(worlds[i])
-            self._rgb[at, i], self._depth[at, i] = frame.rgb, frame.depth
+    def jobs(self, todo: np.ndarray) -> list[Callable[[], bool]]:
+        """Return what draws the worlds that begin or step, for each thread; False says that one was not finite."""
+        if self._drop_share > 0.0:
+            todo = self._without_dropped(todo)
+        self._observed = self._blank()
+        given = (todo, self._worlds)
+        latest = (self._rgb, self._depth, *self._observed)
+        parts = zip(self._ranges, self._studios, strict=True)
+        return [partial(paint, *ends, *given, studio, *latest) for ends, studio in parts]
 
-    def observed(self, worlds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return fresh colours (n, H, W, 3) uint8 and depths (n, H, W) float32 m as they are observed now."""
-        oldest, every = (worlds["steps"] + 1) % len(self._rgb), np.arange(len(worlds))
-        return self._rgb[oldest, every], self._depth[oldest, every]
+    def observed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return fresh colours (n, H, W, 3 or, with nearness, 4) uint8 and depths (n, H, W) float32 m, seen now."""
+        return self._observed
+
+    def _blank(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.empty(self._shape, np.uint8), np.empty(self._shape[:3], np.float32)
+
+    def _without_dropped(self, todo: np.ndarray) -> np.ndarray:
+        """Leave out the worlds whose picture never arrives: what they saw last stands."""
+        todo, slots = todo.copy(), len(self._rgb)
+        for i in np.flatnonzero(todo == STEP):
+            draws = np.random.Generator(np.random.Philox(key=int(self._worlds[i]["picture_seed"])))
+            if float(draws.random()) < self._drop_share:
+                at, todo[i] = int(self._worlds[i]["steps"]), SKIP
+                for kept in (self._rgb, self._depth):
+                    kept[at % slots, i] = kept[(at - 1) % slots, i]
+        return todo
+
+
+def _studio(single: "FollowEnv") -> Studio:
+    """Return what a thread needs to draw the worlds of `single`."""
+    camera, robot, body = single.camera, single.robot_config, load_body(*single._dressed)
+    eye, scene = CameraPose(0.0, 0.0, robot.camera_height, 0.0), pack_scene(single.scene)
+    sensor = RGBDSensor(single._sensor.depth, single._sensor.colour, camera)
+    times = 2 if camera.config.supersample == 2 else 0
+    return Studio(
+        make_view(camera, eye, 1),
+        make_view(camera, eye, 2),
+        _canvas(camera.height, camera.width),
+        _canvas(camera.height * times, camera.width * times),
+        robot.camera_forward,
+        scene,
+        pack_people([(body.mesh, 1)]),
+        make_workspace(scene, len(body.mesh.anchors), len(body.mesh.faces)),
+        Walker(body).figure,
+        body.bones,
+        body.weights,
+        np.zeros((len(body.joints), 3, 3)),
+        np.zeros((len(body.joints), 3)),
+        sensor.model,
+        sensor.work,
+    )
+
+
+def _canvas(height: int, width: int) -> Canvas:
+    shape = (height, width)
+    return Canvas(np.zeros((*shape, 3), np.uint8), np.zeros(shape, np.float32), np.zeros(shape, np.uint8))

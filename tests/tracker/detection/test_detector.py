@@ -44,9 +44,9 @@ def test_what_is_reported_lies_in_the_picture_and_repeats(weights: Path) -> None
 
 def test_outputs_that_say_the_truth_are_read_as_the_truth() -> None:
     people = np.array([[0.1, 0.2, 0.35, 0.9], [0.6, 0.1, 0.8, 1.0]])
-    labels, offsets, _ = match(people, np.array([False, False]), PRIORS)
-    logits = np.stack([np.zeros(len(PRIORS)), np.where(labels == 1, 4.0, -4.0)], axis=1)
-    found = read(logits, offsets, PRIORS, (640, 480), 0.5)
+    said = match(people, np.array([False, False]), PRIORS)
+    logits = np.stack([np.zeros(len(PRIORS)), np.where(said.labels == 1, 4.0, -4.0)], axis=1)
+    found = read(logits, said.offsets, PRIORS, (640, 480), 0.5)
     boxes = np.array(sorted(d.box for d in found))
     np.testing.assert_allclose(boxes, people * (640, 480, 640, 480), atol=0.1)
     assert found[0].score == pytest.approx(1.0 / (1.0 + np.exp(-4.0)))

@@ -7,7 +7,6 @@ would see, crops, zooms, mirrors and squashes it to the networks' input. Boxes a
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -18,19 +17,18 @@ from follow_env.camera.pinhole import CameraPose, PinholeCamera
 from follow_env.camera.raster import RasterRenderer
 from follow_env.camera.sensor import RGBDSensor
 from follow_env.config import IDEAL_SENSOR, CameraConfig, DepthConfig
-from follow_env.person.bodies import BODIES, OUTFITS, PATTERNS, SUITS, Outfit, load_body
-from follow_env.person.walker import POSTURES, Walker
+from follow_env.person.bodies import BODIES, DETAILS, load_body
+from follow_env.person.walker import Walker
 from follow_env.scene import Scene
+from tracker.detection.looks import Look, draw_look, draw_posture
 from tracker.detection.photometry import disturb, draw_backdrop
 from tracker.detection.priors import INPUT_SIZE
-from tracker.detection.rooms import draw_colour, draw_scene
+from tracker.detection.rooms import draw_scene
 
 CAMERA = CameraConfig(width=400, height=300, hfov_deg=75.0)
 """What is rendered: the Xtion's 57.5 degrees and a margin to turn and to move in, at the same px per degree."""
 ASPECT = 0.75
 """Height over width of the pictures that a network sees squashed to a square."""
-HARD_POSTURES = {"crouch": 2, "arms_raised": 2, "sideways": 2, "bent": 2, "floating": 4, "head_down": 3}
-"""How often these are drawn for every time that one of the others is."""
 
 
 @dataclass(frozen=True)
@@ -105,14 +103,6 @@ class Sample:
     difficult: np.ndarray
 
 
-class _Look(NamedTuple):
-    """A body (one of `BODIES`), its level of detail, and its clothes."""
-
-    body: str
-    detail: str
-    outfit: Outfit
-
-
 class SampleSource:
     """Samples by number: the same seed and number give the same sample, whatever was made before.
 
@@ -127,7 +117,7 @@ class SampleSource:
         square = PinholeCamera(CameraConfig(width=INPUT_SIZE, height=INPUT_SIZE, hfov_deg=CAMERA.hfov_deg))
         self._sensor = RGBDSensor(DepthConfig(), IDEAL_SENSOR.colour, square)
         self._walkers = {
-            (name, detail): Walker(load_body(name, detail=detail)) for name in BODIES for detail in ("low", "high")
+            (name, detail): Walker(load_body(name, detail=detail)) for name in BODIES for detail in DETAILS
         }
         self._group = -1
         self._scene: Scene
@@ -186,11 +176,11 @@ class SampleSource:
                 spots.append(spot)
             if len(spots) == count:
                 break
-        looks = [_draw_look(rng) for _ in spots]
+        looks = [draw_look(rng) for _ in spots]
         if spots and rng.random() < config.pair_share:
             beside = self._draw_beside(rng, (x, y), spots)
             spots += beside
-            looks += [looks[0] if rng.random() < 0.5 else _draw_look(rng) for _ in beside]
+            looks += [looks[0] if rng.random() < 0.5 else draw_look(rng) for _ in beside]
         people = zip(spots, looks, strict=True)
         return pose, [self._draw_person(rng, spot, look, id) for id, (spot, look) in enumerate(people, 1)]
 
@@ -219,10 +209,10 @@ class SampleSource:
                 break
         return spot
 
-    def _draw_person(self, rng: np.random.Generator, spot: tuple[float, float], look: _Look, id: int) -> Placed:
+    def _draw_person(self, rng: np.random.Generator, spot: tuple[float, float], look: Look, id: int) -> Placed:
         """Return a person of any build and posture."""
         (x, y), (name, detail, outfit) = spot, look
-        posture = "walk" if rng.random() < self.config.walk_share else _draw_posture(rng)
+        posture = "walk" if rng.random() < self.config.walk_share else draw_posture(rng)
         heading, walked, speed = rng.uniform(-math.pi, math.pi), rng.uniform(0.0, 1.6), rng.uniform(0.0, 1.8)
         placed = self._walkers[name, detail].place(x, y, heading, walked, speed, posture)
         broad, tall = rng.uniform(0.92, 1.12), rng.uniform(0.92, 1.08)
@@ -268,34 +258,6 @@ class SampleSource:
         nowhere = np.zeros(turned.shape, np.uint8)
         seed = int(rng.integers(1 << 63))
         return self._sensor.corrupt(RGBDFrame(rgb, turned, nowhere), seed).depth
-
-
-def _draw_posture(rng: np.random.Generator) -> str:
-    urn = [posture for posture in POSTURES for _ in range(HARD_POSTURES.get(posture, 1))]
-    return urn[rng.integers(len(urn))]
-
-
-def _draw_look(rng: np.random.Generator) -> _Look:
-    """Return any body in any clothes."""
-    name, detail = BODIES[rng.integers(len(BODIES))], "high" if rng.random() < 0.25 else "low"
-    named = [*OUTFITS.values(), *SUITS.values()]
-    outfit = named[rng.integers(len(named))] if rng.random() < 0.25 else _draw_outfit(rng)
-    return _Look(name, detail, outfit)
-
-
-def _draw_outfit(rng: np.random.Generator) -> Outfit:
-    """Return clothes of any colours; a fifth are overalls of one colour, as a spacesuit is."""
-    dark, light = np.array((0.22, 0.14, 0.10)), np.array((0.92, 0.75, 0.66))
-    red, green, blue = (dark + (light - dark) * rng.random()).tolist()
-    shirt = draw_colour(rng)
-    return Outfit(
-        skin=(red, green, blue),
-        hair=draw_colour(rng, 0.6),
-        shirt=shirt,
-        trousers=shirt if rng.random() < 0.2 else draw_colour(rng, 0.7),
-        shoes=draw_colour(rng, 0.7),
-        pattern="plain" if rng.random() < 0.6 else PATTERNS[rng.integers(len(PATTERNS))],
-    )
 
 
 def _free(scene: Scene, spot: tuple[float, float]) -> bool:

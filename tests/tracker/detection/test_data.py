@@ -12,14 +12,8 @@ from follow_env.camera.pinhole import CameraPose
 from follow_env.person.walker import POSTURES
 from follow_env.scenes import SCENES
 from tracker.detection.boxes import iou
-from tracker.detection.data import (
-    CAMERA,
-    HARD_POSTURES,
-    DataConfig,
-    SampleSource,
-    _draw_posture,
-    without_augmentation,
-)
+from tracker.detection.data import CAMERA, DataConfig, SampleSource, without_augmentation
+from tracker.detection.looks import HARD_POSTURES, draw_posture
 from tracker.detection.photometry import disturb, draw_backdrop
 from tracker.detection.preview import sheet
 from tracker.detection.rooms import draw_room, draw_scene
@@ -83,7 +77,7 @@ def test_pairs_are_close_and_hide_each_other_by_every_degree() -> None:
 
 def test_every_posture_is_shown_and_the_hard_ones_more_often() -> None:
     rng = np.random.default_rng(0)
-    drawn = Counter(_draw_posture(rng) for _ in range(3000))
+    drawn = Counter(draw_posture(rng) for _ in range(3000))
     usual = (drawn["walk"] + drawn["stand"]) / 2
     assert set(drawn) == set(POSTURES)
     assert set(HARD_POSTURES) < set(POSTURES)

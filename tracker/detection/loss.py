@@ -19,29 +19,22 @@ class Loss(NamedTuple):
 
 
 def multibox_loss(
-    logits: torch.Tensor,
-    offsets: torch.Tensor,
-    labels: torch.Tensor,
-    weights: torch.Tensor,
-    targets: torch.Tensor,
-    places: torch.Tensor,
+    logits: torch.Tensor, offsets: torch.Tensor, labels: torch.Tensor, targets: torch.Tensor, weights: torch.Tensor
 ) -> Loss:
-    """Return softmax cross-entropy over positives and the hardest negatives plus smooth L1 where people are.
+    """Return softmax cross-entropy over positives and the hardest negatives plus smooth L1 over positives.
 
-    Three things differ from SSD. A person counts by the root of the number of priors that have to find it, not by that
+    Two things differ from SSD. A person counts by the root of the number of priors that have to find it, not by that
     number: it is some 60 for one who fills the picture and 1 for one 4 m away, who would be learned last. And the
     hardest negatives, `NEGATIVES_PER_POSITIVE` for each positive in number and in weight, are those of the whole batch,
-    not of each picture: pictures without anybody have no positives, and would teach nothing. And the offsets are
-    learned by more priors than the positives (`tracker.detection.priors.match`), in a mean of its own. A batch without
-    anybody counts as one with one positive prior.
+    not of each picture: pictures without anybody have no positives, and would teach nothing. A batch without anybody
+    counts as one with one positive prior.
 
     Args:
         logits: (B, P, 2), background and person.
         offsets: (B, P, 4).
         labels: (B, P) int64, `POSITIVE`, `NEGATIVE` or `IGNORED`.
+        targets: (B, P, 4), read where positive.
         weights: (B, P), read where positive: what each counts.
-        targets: (B, P, 4), offsets, read where `places` is not 0.
-        places: (B, P), what the offsets of each prior count.
     """
     positive, negative = labels == POSITIVE, labels == NEGATIVE
     weight = weights[positive]
@@ -51,7 +44,6 @@ def multibox_loss(
     hardest = min(NEGATIVES_PER_POSITIVE * max(len(weight), 1), int(negative.sum()))
     background = entropy[negative].topk(hardest, sorted=False).values.mean()
     classification = (weight * entropy[positive]).sum() / mass + NEGATIVES_PER_POSITIVE * background
-    placed = places > 0.0
-    apart = functional.smooth_l1_loss(offsets[placed], targets[placed], reduction="none").sum(dim=1)
-    location = (places[placed] * apart).sum() / places.sum().clamp(min=1.0)
+    apart = functional.smooth_l1_loss(offsets[positive], targets[positive], reduction="none").sum(dim=1)
+    location = (weight * apart).sum() / mass
     return Loss(classification + location, classification, location)

@@ -18,9 +18,7 @@ VARIANCES = (0.1, 0.2)
 MATCH_OVERLAP = 0.5
 """Least overlap at which a prior has to find a person (paper A, figure 8; SSD)."""
 NEAR_OVERLAP = 0.4
-"""Least overlap at which a prior may find a person."""
-PLACE_OVERLAP = 0.3
-"""Least overlap at which a prior learns where the person is, so that it says so if it finds one in spite of all."""
+"""Least overlap at which a prior may find a person: what it says then is suppressed by the better ones anyway."""
 POSITIVE, NEGATIVE, IGNORED = 1, 0, -1
 """Labels of priors: person, background, neither (it overlaps a person a little too little, or one too hard to see)."""
 
@@ -118,16 +116,13 @@ class Targets(NamedTuple):
 
     Attributes:
         labels: (P,) int64, `POSITIVE`, `NEGATIVE` or `IGNORED`.
+        offsets: (P, 4) float32, where positive.
         weights: (P,) float32, where positive: 1 / sqrt(n), n being the priors that have to find the same person.
-        offsets: (P, 4) float32, where `places` is not 0.
-        places: (P,) float32, what the offsets count: 1 / sqrt(m), m being the priors that learn the place of a person;
-            0 where there is nobody.
     """
 
     labels: np.ndarray
-    weights: np.ndarray
     offsets: np.ndarray
-    places: np.ndarray
+    weights: np.ndarray
 
 
 def match(boxes: np.ndarray, difficult: np.ndarray, priors: np.ndarray) -> Targets:
@@ -135,12 +130,8 @@ def match(boxes: np.ndarray, difficult: np.ndarray, priors: np.ndarray) -> Targe
 
     As SSD: the best pair of a person and a prior is joined, then the best of what is left, until every person has a
     prior of its own; then each prior that overlaps a person by `MATCH_OVERLAP` takes the one it overlaps most. The
-    first step matters here: beyond 3.8 m no prior of paper A reaches that overlap with an adult.
-
-    Two things differ from SSD. A prior between `NEAR_OVERLAP` and that is ignored: those were nearly all of the hardest
-    negatives, and taught little else. And a prior learns the place of a person from `PLACE_OVERLAP` on, not only where
-    it has to find one: a tall prior on the trunk of somebody with an arm stretched out is often more certain than those
-    that fit, and if nobody taught it the arm, it reports the trunk alone and suppresses them.
+    first step matters here: beyond 3.8 m no prior of paper A reaches that overlap with an adult. Unlike in SSD, a prior
+    between `NEAR_OVERLAP` and that is ignored: those were nearly all of the hardest negatives, and taught little else.
 
     Args:
         boxes: (N, 4) people, corners.
@@ -154,10 +145,10 @@ def match(boxes: np.ndarray, difficult: np.ndarray, priors: np.ndarray) -> Targe
         raise ValueError(f"the boxes {boxes.tolist()} are not all (u0, v0, u1, v1) with u0 < u1 and v0 < v1")
     if len(boxes) > len(priors):
         raise ValueError(f"there are {len(boxes)} people for {len(priors)} priors; expected at most one each")
-    labels, weights = np.zeros(len(priors), np.int64), np.zeros(len(priors), np.float32)
-    offsets, places = np.zeros((len(priors), 4), np.float32), np.zeros(len(priors), np.float32)
+    labels, offsets = np.zeros(len(priors), np.int64), np.zeros((len(priors), 4), np.float32)
+    weights = np.zeros(len(priors), np.float32)
     if len(boxes) == 0:
-        return Targets(labels, weights, offsets, places)
+        return Targets(labels, offsets, weights)
     overlaps = iou(boxes, to_corners(priors))
     owner = overlaps.argmax(axis=0)
     best = overlaps.max(axis=0)
@@ -170,8 +161,6 @@ def match(boxes: np.ndarray, difficult: np.ndarray, priors: np.ndarray) -> Targe
         overlaps[person], overlaps[:, prior] = -1.0, -1.0
     labels[owned] = np.where(difficult[owner[owned]], IGNORED, POSITIVE)
     found = labels == POSITIVE
+    offsets[found] = encode(boxes[owner[found]], priors[found])
     weights[found] = 1.0 / np.sqrt(np.bincount(owner[found])[owner[found]])
-    placed = (owned | (best >= PLACE_OVERLAP)) & ~difficult[owner]
-    offsets[placed] = encode(boxes[owner[placed]], priors[placed])
-    places[placed] = 1.0 / np.sqrt(np.bincount(owner[placed])[owner[placed]])
-    return Targets(labels, weights, offsets, places)
+    return Targets(labels, offsets, weights)

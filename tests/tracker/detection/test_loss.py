@@ -10,12 +10,7 @@ from tracker.detection.priors import IGNORED, NEGATIVE, POSITIVE
 
 
 def plain_loss(
-    logits: np.ndarray,
-    offsets: np.ndarray,
-    labels: np.ndarray,
-    weights: np.ndarray,
-    targets: np.ndarray,
-    places: np.ndarray,
+    logits: np.ndarray, offsets: np.ndarray, labels: np.ndarray, targets: np.ndarray, weights: np.ndarray
 ) -> tuple[float, float]:
     positives, negatives, location, mass = [], [], 0.0, 0.0
     for b in range(labels.shape[0]):
@@ -24,21 +19,20 @@ def plain_loss(
             if labels[b, p] == POSITIVE:
                 positives.append(weights[b, p] * (total - logits[b, p, 1]))
                 mass += weights[b, p]
+                for difference in np.abs(offsets[b, p] - targets[b, p]):
+                    location += weights[b, p] * (0.5 * difference**2 if difference < 1.0 else difference - 0.5)
             elif labels[b, p] == NEGATIVE:
                 negatives.append(total - logits[b, p, 0])
-            for difference in np.abs(offsets[b, p] - targets[b, p]):
-                location += places[b, p] * (0.5 * difference**2 if difference < 1.0 else difference - 0.5)
     hardest = sorted(negatives, reverse=True)[: NEGATIVES_PER_POSITIVE * max(len(positives), 1)]
-    background = NEGATIVES_PER_POSITIVE * sum(hardest) / len(hardest)
-    return sum(positives) / max(mass, 1.0) + background, location / max(places.sum(), 1.0)
+    mass = max(mass, 1.0)
+    return sum(positives) / mass + NEGATIVES_PER_POSITIVE * sum(hardest) / len(hardest), location / mass
 
 
 def case(labels: np.ndarray) -> tuple[np.ndarray, ...]:
     rng = np.random.default_rng(4)
     shape = labels.shape
     logits, offsets = 2 * rng.standard_normal((*shape, 2)), 2 * rng.standard_normal((*shape, 4))
-    weights, places = rng.uniform(0.2, 1.0, (2, *shape))
-    return logits, offsets, labels, weights, rng.random((*shape, 4)), np.where(labels == NEGATIVE, 0.0, places)
+    return logits, offsets, labels, rng.random((*shape, 4)), rng.uniform(0.2, 1.0, shape)
 
 
 def test_it_equals_the_sum_by_hand() -> None:
@@ -61,19 +55,10 @@ def test_a_batch_without_people_teaches_its_hardest_background() -> None:
 def test_three_negatives_teach_for_each_positive_and_ignored_priors_nothing() -> None:
     labels = np.full((2, 100), NEGATIVE)
     labels[0, :5], labels[1, 50:80] = POSITIVE, IGNORED
-    logits, offsets, labels, *others = (torch.from_numpy(array) for array in case(labels))
+    logits, offsets, labels, targets, weights = (torch.from_numpy(array) for array in case(labels))
     logits.requires_grad_()
-    multibox_loss(logits, offsets, labels, *others).total.backward()
+    multibox_loss(logits, offsets, labels, targets, weights).total.backward()
     taught = logits.grad.abs().sum(dim=2) > 0
     assert taught[labels == POSITIVE].all()
     assert taught[labels == NEGATIVE].sum() == NEGATIVES_PER_POSITIVE * 5
     assert not taught[labels == IGNORED].any()
-
-
-def test_places_are_taught_where_they_count_and_nowhere_else() -> None:
-    labels = np.random.default_rng(5).choice((POSITIVE, NEGATIVE, IGNORED), size=(2, 60))
-    logits, offsets, labels, weights, targets, places = (torch.from_numpy(array) for array in case(labels))
-    offsets.requires_grad_()
-    multibox_loss(logits, offsets, labels, weights, targets, places).total.backward()
-    assert ((offsets.grad.abs().sum(dim=2) > 0) == (places > 0)).all()
-    assert (places > 0).sum() > (labels == POSITIVE).sum()

@@ -49,7 +49,7 @@ def test_every_weight_gets_a_gradient(name: str) -> None:
     network = make_network(name).train()
     logits, offsets = network(torch.rand(2, 3, 300, 300))
     labels = (torch.rand(logits.shape[:2]) < 0.5).long()
-    multibox_loss(logits, offsets, labels, labels.float(), torch.randn_like(offsets), labels.float()).total.backward()
+    multibox_loss(logits, offsets, labels, torch.randn_like(offsets), labels.float()).total.backward()
     silent = [n for n, p in network.named_parameters() if p.grad is None or not p.grad.abs().sum() > 0]
     assert silent == []
 

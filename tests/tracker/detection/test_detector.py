@@ -9,7 +9,7 @@ import torch
 from safetensors.torch import save_file
 
 from tracker.detection.boxes import iou
-from tracker.detection.detector import OVERLAP, PersonDetector, network_input, read
+from tracker.detection.detector import AGREEMENT, PersonDetector, network_input, read
 from tracker.detection.networks import NETS, make_network
 from tracker.detection.priors import PAPER_LAYERS, encode, match, prior_boxes, to_corners
 from tracker.detection.weights import save_weights
@@ -39,7 +39,7 @@ def test_what_is_reported_lies_in_the_picture_and_repeats(weights: Path) -> None
     assert scores == sorted(scores, reverse=True)
     assert all(type(value) is float for value in (*found[0].box, found[0].score))
     overlaps = iou(boxes, boxes) - np.eye(len(boxes))
-    assert overlaps.max() <= OVERLAP
+    assert overlaps.max() <= AGREEMENT
 
 
 def test_outputs_that_say_the_truth_are_read_as_the_truth() -> None:

@@ -21,7 +21,7 @@ def add(commands: Commands) -> None:
         "--rate", type=float, default=1.5e-3, metavar="R", help="largest learning rate (default: %(default)s)"
     )
     train.add_argument(
-        "--walk-share", type=float, default=0.55, metavar="S",
+        "--walk-share", type=float, default=0.15, metavar="S",
         help="share of the people who walk, besides those of all postures (default: %(default)s)",
     )  # fmt: skip
     train.add_argument("--out", type=Path, metavar="DIR", help="folder of the run (default: results/detector-NET)")

@@ -52,6 +52,21 @@ def nms(boxes: np.ndarray, scores: np.ndarray, overlap: float = 0.45) -> np.ndar
     return order[_suppress(edges, area(edges.T), overlap)]
 
 
+def vote(chosen: np.ndarray, boxes: np.ndarray, scores: np.ndarray, overlap: float) -> np.ndarray:
+    """Return the chosen boxes (K, 4), each as the mean of all boxes that overlap it enough, weighted by their scores.
+
+    "Box voting" (Gidaris and Komodakis, 2015): the most certain box of a person is not always the one that fits best.
+
+    Args:
+        chosen: (K, 4), some of the boxes.
+        boxes: (N, 4).
+        scores: (N,), positive.
+        overlap: least intersection over union of a box that has a vote.
+    """
+    votes = np.where(iou(chosen, boxes) >= overlap, scores, 0.0)
+    return (votes[:, :, None] * boxes).sum(axis=1) / votes.sum(axis=1)[:, None]
+
+
 @numba.njit(cache=True)
 def _suppress(edges: np.ndarray, areas: np.ndarray, overlap: float) -> np.ndarray:
     """Return which of the sorted boxes remain, (N,) bool, from their edges (4, N) and areas (N,).

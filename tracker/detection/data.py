@@ -17,12 +17,13 @@ from follow_env.camera.pinhole import CameraPose, PinholeCamera
 from follow_env.camera.raster import RasterRenderer
 from follow_env.camera.sensor import RGBDSensor
 from follow_env.config import IDEAL_SENSOR, CameraConfig, DepthConfig
-from follow_env.person.bodies import BODIES, OUTFITS, PATTERNS, Outfit, load_body
-from follow_env.person.walker import POSTURES, Walker
+from follow_env.person.bodies import BODIES, DETAILS, load_body
+from follow_env.person.walker import Walker
 from follow_env.scene import Scene
+from tracker.detection.looks import Look, draw_look, draw_posture
 from tracker.detection.photometry import disturb, draw_backdrop
 from tracker.detection.priors import INPUT_SIZE
-from tracker.detection.rooms import draw_colour, draw_scene
+from tracker.detection.rooms import draw_scene
 
 CAMERA = CameraConfig(width=400, height=300, hfov_deg=75.0)
 """What is rendered: the Xtion's 57.5 degrees and a margin to turn and to move in, at the same px per degree."""
@@ -37,12 +38,13 @@ class DataConfig:
     Attributes:
         people: most people in a picture.
         empty_share: share of pictures without anybody.
-        nearest, farthest: distance of the people, m; half of them are nearer than 2.5 m by default.
+        nearest, farthest: distance of the people, m; half of them are nearer than 3 m by default.
         lowest, highest: height of the camera, m.
         pitch_deg, roll_deg: largest inclination of the camera, degrees.
         zoom: largest enlargement of a crop.
         crop_share: share of the pictures that are cropped.
         walk_share: share of the people who walk, besides those of all postures.
+        pair_share: share of the pictures in which somebody stands close to another, before, behind or beside them.
         pictures_per_scene: pictures before another scene is built.
         min_pixels: a person of fewer visible pixels (of 300 x 300) is difficult.
         min_share: so is one whose visible share of what lies inside the picture is smaller.
@@ -58,8 +60,9 @@ class DataConfig:
     pitch_deg: float = 12.0
     roll_deg: float = 5.0
     zoom: float = 1.7
-    crop_share: float = 0.4
-    walk_share: float = 0.55
+    crop_share: float = 0.3
+    walk_share: float = 0.15
+    pair_share: float = 0.3
     pictures_per_scene: int = 8
     min_pixels: int = 150
     min_share: float = 0.25
@@ -72,8 +75,9 @@ class DataConfig:
             raise ValueError(
                 f"people stand from {self.nearest} to {self.farthest} m; expected 0.5 <= nearest <= farthest <= 20"
             )
-        if not 0.0 <= self.walk_share <= 1.0:
-            raise ValueError(f"walk_share is {self.walk_share}; expected a share from 0 to 1")
+        for name in ("walk_share", "pair_share"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"{name} is {getattr(self, name)}; expected a share from 0 to 1")
         if self.pictures_per_scene < 1 or self.zoom < 1.0:
             raise ValueError(
                 f"pictures_per_scene, zoom are {self.pictures_per_scene}, {self.zoom}; expected at least 1 each"
@@ -113,7 +117,7 @@ class SampleSource:
         square = PinholeCamera(CameraConfig(width=INPUT_SIZE, height=INPUT_SIZE, hfov_deg=CAMERA.hfov_deg))
         self._sensor = RGBDSensor(DepthConfig(), IDEAL_SENSOR.colour, square)
         self._walkers = {
-            (name, detail): Walker(load_body(name, detail=detail)) for name in BODIES for detail in ("low", "high")
+            (name, detail): Walker(load_body(name, detail=detail)) for name in BODIES for detail in DETAILS
         }
         self._group = -1
         self._scene: Scene
@@ -165,15 +169,35 @@ class SampleSource:
         count = 0 if rng.random() < config.empty_share else 1 + int(config.people * rng.random() ** 2)
         spots: list[tuple[float, float]] = []
         for _ in range(8 * count):
-            distance = config.nearest + (config.farthest - config.nearest) * rng.random() ** 1.5
-            bearing = yaw + rng.uniform(-0.55, 0.55)
+            distance = config.nearest + (config.farthest - config.nearest) * rng.random() ** 1.2
+            bearing = yaw + rng.triangular(-0.55, 0.0, 0.55)
             spot = (x + distance * math.cos(bearing), y + distance * math.sin(bearing))
-            apart = all(math.dist(spot, other) > 0.45 for other in spots)
-            if apart and _inside(scene, spot, 0.3) and scene.clearance(np.array([spot])) > 0.2:
+            if all(math.dist(spot, other) > 0.45 for other in spots) and _free(scene, spot):
                 spots.append(spot)
             if len(spots) == count:
                 break
-        return pose, [self._draw_person(rng, *spot, id) for id, spot in enumerate(spots, 1)]
+        looks = [draw_look(rng) for _ in spots]
+        if spots and rng.random() < config.pair_share:
+            beside = self._draw_beside(rng, (x, y), spots)
+            spots += beside
+            looks += [looks[0] if rng.random() < 0.5 else draw_look(rng) for _ in beside]
+        people = zip(spots, looks, strict=True)
+        return pose, [self._draw_person(rng, spot, look, id) for id, (spot, look) in enumerate(people, 1)]
+
+    def _draw_beside(
+        self, rng: np.random.Generator, camera: tuple[float, float], spots: list[tuple[float, float]]
+    ) -> list[tuple[float, float]]:
+        """Return a place up to 1.1 m from the first of some, in depth or across, or none if there is no room."""
+        (x, y), away = spots[0], math.dist(camera, spots[0])
+        c, s = (x - camera[0]) / away, (y - camera[1]) / away
+        for _ in range(8):
+            far, near = rng.uniform(0.3, 1.0) * rng.choice((-1.0, 1.0)), rng.uniform(-0.45, 0.45)
+            ahead, left = (far, near) if rng.random() < 0.5 else (near, far)
+            spot = (x + c * ahead - s * left, y + s * ahead + c * left)
+            apart = all(math.dist(spot, other) > 0.45 for other in spots[1:])
+            if apart and away + ahead > self.config.nearest and _free(self._scene, spot):
+                return [spot]
+        return []
 
     def _draw_free(self, rng: np.random.Generator) -> tuple[float, float]:
         """Return a place on the floor, without furniture if one is found."""
@@ -185,12 +209,10 @@ class SampleSource:
                 break
         return spot
 
-    def _draw_person(self, rng: np.random.Generator, x: float, y: float, id: int) -> Placed:
-        """Return a person of any body, build, clothes and posture."""
-        name, detail = BODIES[rng.integers(len(BODIES))], "high" if rng.random() < 0.25 else "low"
-        names = [*OUTFITS]
-        outfit = names[rng.integers(len(names))] if rng.random() < 0.25 else _draw_outfit(rng)
-        posture = "walk" if rng.random() < self.config.walk_share else POSTURES[rng.integers(len(POSTURES))]
+    def _draw_person(self, rng: np.random.Generator, spot: tuple[float, float], look: Look, id: int) -> Placed:
+        """Return a person of any build and posture."""
+        (x, y), (name, detail, outfit) = spot, look
+        posture = "walk" if rng.random() < self.config.walk_share else draw_posture(rng)
         heading, walked, speed = rng.uniform(-math.pi, math.pi), rng.uniform(0.0, 1.6), rng.uniform(0.0, 1.8)
         placed = self._walkers[name, detail].place(x, y, heading, walked, speed, posture)
         broad, tall = rng.uniform(0.92, 1.12), rng.uniform(0.92, 1.08)
@@ -238,22 +260,11 @@ class SampleSource:
         return self._sensor.corrupt(RGBDFrame(rgb, turned, nowhere), seed).depth
 
 
-def _draw_outfit(rng: np.random.Generator) -> Outfit:
-    dark, light = np.array((0.22, 0.14, 0.10)), np.array((0.92, 0.75, 0.66))
-    red, green, blue = (dark + (light - dark) * rng.random()).tolist()
-    return Outfit(
-        skin=(red, green, blue),
-        hair=draw_colour(rng, 0.6),
-        shirt=draw_colour(rng),
-        trousers=draw_colour(rng, 0.7),
-        shoes=draw_colour(rng, 0.7),
-        pattern="plain" if rng.random() < 0.6 else PATTERNS[rng.integers(len(PATTERNS))],
-    )
-
-
-def _inside(scene: Scene, spot: tuple[float, float], margin: float) -> bool:
+def _free(scene: Scene, spot: tuple[float, float]) -> bool:
+    """Return whether somebody can stand there."""
     x0, x1, y0, y1 = scene.bounds
-    return x0 + margin < spot[0] < x1 - margin and y0 + margin < spot[1] < y1 - margin
+    inside = x0 + 0.3 < spot[0] < x1 - 0.3 and y0 + 0.3 < spot[1] < y1 - 0.3
+    return inside and bool(scene.clearance(np.array([spot])) > 0.2)
 
 
 def _visible_share(person: Placed, pose: CameraPose, window: np.ndarray, ids: np.ndarray) -> float:

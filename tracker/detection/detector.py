@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from follow_env.config import choose
-from tracker.detection.boxes import Detection, nms
+from tracker.detection.boxes import Detection, nms, vote
 from tracker.detection.networks import DEPTH_RANGE, NETS, MultiBoxNet
 from tracker.detection.priors import INPUT_SIZE, decode, prior_boxes
 from tracker.detection.weights import load_network
@@ -15,7 +15,10 @@ from tracker.detection.weights import load_network
 CONFIDENCE = 0.5
 """Least score of an effective output (paper A, section 3.2)."""
 OVERLAP = 0.45
-"""Greatest overlap of two people that are both reported (SSD)."""
+"""Greatest overlap of two outputs that are both kept (SSD)."""
+AGREEMENT = 0.6
+"""Least overlap at which an effective output has a vote in a kept one's box, and at which two boxes that were voted for
+are the same person's. The most certain output often shows the trunk alone, where an arm is stretched out."""
 GRID = 0.25
 """Boxes are rounded to this, px: far below their error and far above the last bits of a convolution (1e-5 px), in which
 processors differ. In a closed loop such bits would come back larger."""
@@ -116,10 +119,14 @@ def read(
     likely = np.flatnonzero(scores >= confidence)
     width, height = size
     boxes = np.clip(decode(offsets[likely], priors[likely]), 0.0, 1.0) * (width, height, width, height)
-    if grid:
-        boxes = grid * np.round(boxes / grid)
-    scores = scores[likely]
-    return [Detection(tuple(boxes[k].tolist()), float(scores[k])) for k in nms(boxes, scores, OVERLAP)]
+    boxes, scores = _rounded(boxes, grid), scores[likely]
+    best = nms(boxes, scores, OVERLAP)
+    agreed, scores = _rounded(vote(boxes[best], boxes, scores, AGREEMENT), grid), scores[best]
+    return [Detection(tuple(agreed[k].tolist()), float(scores[k])) for k in nms(agreed, scores, AGREEMENT)]
+
+
+def _rounded(boxes: np.ndarray, grid: float) -> np.ndarray:
+    return grid * np.round(boxes / grid) if grid else boxes
 
 
 def _check(rgb: np.ndarray, depth: np.ndarray | None, needs_depth: bool) -> None:

@@ -27,7 +27,10 @@ def draw_scene(rng: np.random.Generator) -> Scene:
 
 
 def draw_room(rng: np.random.Generator) -> Scene:
-    """Return a room with furniture, pictures on the walls, and people's rivals: upright things of a person's size."""
+    """Return a room with furniture, pictures on the walls, and people's rivals: upright things of a person's size.
+
+    Nearly a third of them are all but empty.
+    """
     length, width, height = rng.uniform(4.0, 13.0), rng.uniform(2.8, 9.0), rng.uniform(2.3, 3.4)
     x, y, z = 0.5 * length, 0.5 * width, 0.5 * height
     parts: list[Box | Cylinder] = [
@@ -37,9 +40,10 @@ def draw_room(rng: np.random.Generator) -> Scene:
         Box((-x - 0.05, 0.0, z), (0.1, width + 0.2, height), draw_material(rng)),
         Box((0.0, 0.0, height + 0.05), (length, width + 0.2, 0.1), draw_material(rng)),
     ]
-    for _ in range(rng.integers(2, 9)):
+    bare = rng.random() < 0.3
+    for _ in range(rng.integers(0, 3) if bare else rng.integers(2, 9)):
         parts.append(_picture(rng, x, y, height))
-    for _ in range(rng.integers(2, 14)):
+    for _ in range(rng.integers(0, 3) if bare else rng.integers(2, 14)):
         parts += _furniture(rng, rng.uniform(-x, x), rng.uniform(-y, y), height)
     lights = tuple(
         Light((rng.uniform(-x, x), rng.uniform(-y, y), height - 0.1), rng.uniform(0.3, 1.0))

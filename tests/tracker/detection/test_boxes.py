@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tracker.detection.boxes import Detection, iou, nms
+from tracker.detection.boxes import Detection, iou, nms, vote
 
 
 def random_boxes(rng: np.random.Generator, count: int) -> np.ndarray:
@@ -50,6 +50,26 @@ def test_suppression_equals_brute_force(overlap: float) -> None:
 
 def test_suppression_of_nothing() -> None:
     assert nms(np.zeros((0, 4)), np.zeros(0)).tolist() == []
+
+
+def test_voting_equals_a_mean_by_hand() -> None:
+    rng = np.random.default_rng(2)
+    boxes, scores = random_boxes(rng, 120), rng.uniform(0.1, 1.0, 120)
+    best = nms(boxes, scores)
+    voters = 0
+    for box, agreed in zip(boxes[best], vote(boxes[best], boxes, scores, 0.5), strict=True):
+        total, weight = np.zeros(4), 0.0
+        for other, score in zip(boxes, scores, strict=True):
+            if iou(box[None], other[None])[0, 0] >= 0.5:
+                total, weight, voters = total + score * other, weight + score, voters + 1
+        np.testing.assert_allclose(agreed, total / weight)
+    assert voters > len(best)
+
+
+def test_a_box_that_nobody_shares_stays_and_nothing_votes_for_nothing() -> None:
+    boxes = np.array([[0.1, 0.1, 0.3, 0.4], [0.6, 0.6, 0.9, 0.9]])
+    np.testing.assert_allclose(vote(boxes, boxes, np.array([0.9, 0.2]), 0.6), boxes)
+    assert vote(np.zeros((0, 4)), np.zeros((0, 4)), np.zeros(0), 0.6).shape == (0, 4)
 
 
 def test_a_detection_is_a_value() -> None:

@@ -2,14 +2,18 @@
 
 import dataclasses
 import math
+from collections import Counter
 
 import cv2
 import numpy as np
 import pytest
 
 from follow_env.camera.pinhole import CameraPose
+from follow_env.person.walker import POSTURES
 from follow_env.scenes import SCENES
+from tracker.detection.boxes import iou
 from tracker.detection.data import CAMERA, DataConfig, SampleSource, without_augmentation
+from tracker.detection.looks import HARD_POSTURES, draw_posture
 from tracker.detection.photometry import disturb, draw_backdrop
 from tracker.detection.preview import sheet
 from tracker.detection.rooms import draw_room, draw_scene
@@ -48,6 +52,37 @@ def test_people_of_whom_little_is_seen_are_difficult() -> None:
             assert difficult or (sample.ids == id).sum() >= config.min_pixels
     strict = SampleSource(7, dataclasses.replace(config, min_share=1.01))
     assert all(strict.sample(number).difficult.all() for number in range(4))
+
+
+def test_pairs_are_close_and_hide_each_other_by_every_degree() -> None:
+    config = dataclasses.replace(without_augmentation(DataConfig()), people=1, empty_share=0.0)
+    pairs, alone = (SampleSource(7, dataclasses.replace(config, pair_share=share)) for share in (1.0, 0.0))
+    assert max(len(alone.sample(number).boxes) for number in range(16)) == 1
+    gaps, overlaps, alike = [], [], 0
+    for number in range(64):
+        boxes = pairs.sample(number).boxes
+        _, people = pairs._draw_people(np.random.default_rng((7, 1, number)))
+        if len(people) == 2:
+            first, second = people
+            gaps.append(math.dist(first.pose[:2], second.pose[:2]))
+            alike += np.array_equal(first.mesh.colours, second.mesh.colours)
+        if len(boxes) == 2:
+            overlaps.append(iou(boxes[:1], boxes[1:]).item())
+    assert len(gaps) > 40
+    assert 0.3 <= min(gaps) < 0.5
+    assert 0.8 < max(gaps) < 1.1
+    assert 0.3 < alike / len(gaps) < 0.7
+    assert np.histogram(overlaps, (0.0, 0.1, 0.3, 0.5, 1.0))[0].min() >= 3
+
+
+def test_every_posture_is_shown_and_the_hard_ones_more_often() -> None:
+    rng = np.random.default_rng(0)
+    drawn = Counter(draw_posture(rng) for _ in range(3000))
+    usual = (drawn["walk"] + drawn["stand"]) / 2
+    assert set(drawn) == set(POSTURES)
+    assert set(HARD_POSTURES) < set(POSTURES)
+    for posture, times in HARD_POSTURES.items():
+        assert drawn[posture] / usual == pytest.approx(times, rel=0.2)
 
 
 def test_what_is_shown_varies() -> None:
@@ -126,7 +161,9 @@ def test_the_sheet_shows_as_many_pictures_as_asked_for() -> None:
     assert sheet(SOURCE, 2, 3).shape == (300, 600, 3)
 
 
-@pytest.mark.parametrize("settings", [{"people": 0}, {"nearest": 3.0, "farthest": 2.0}, {"zoom": 0.5}])
+@pytest.mark.parametrize(
+    "settings", [{"people": 0}, {"nearest": 3.0, "farthest": 2.0}, {"zoom": 0.5}, {"pair_share": 1.1}]
+)
 def test_impossible_settings_are_refused(settings: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="expected"):
         DataConfig(**settings)

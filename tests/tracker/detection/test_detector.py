@@ -9,7 +9,7 @@ import torch
 from safetensors.torch import save_file
 
 from tracker.detection.boxes import iou
-from tracker.detection.detector import OVERLAP, PersonDetector, network_input, read
+from tracker.detection.detector import AGREEMENT, PersonDetector, network_input, read
 from tracker.detection.networks import NETS, make_network
 from tracker.detection.priors import PAPER_LAYERS, encode, match, prior_boxes, to_corners
 from tracker.detection.weights import save_weights
@@ -39,14 +39,14 @@ def test_what_is_reported_lies_in_the_picture_and_repeats(weights: Path) -> None
     assert scores == sorted(scores, reverse=True)
     assert all(type(value) is float for value in (*found[0].box, found[0].score))
     overlaps = iou(boxes, boxes) - np.eye(len(boxes))
-    assert overlaps.max() <= OVERLAP
+    assert overlaps.max() <= AGREEMENT
 
 
 def test_outputs_that_say_the_truth_are_read_as_the_truth() -> None:
     people = np.array([[0.1, 0.2, 0.35, 0.9], [0.6, 0.1, 0.8, 1.0]])
-    labels, offsets, _ = match(people, np.array([False, False]), PRIORS)
-    logits = np.stack([np.zeros(len(PRIORS)), np.where(labels == 1, 4.0, -4.0)], axis=1)
-    found = read(logits, offsets, PRIORS, (640, 480), 0.5)
+    said = match(people, np.array([False, False]), PRIORS)
+    logits = np.stack([np.zeros(len(PRIORS)), np.where(said.labels == 1, 4.0, -4.0)], axis=1)
+    found = read(logits, said.offsets, PRIORS, (640, 480), 0.5)
     boxes = np.array(sorted(d.box for d in found))
     np.testing.assert_allclose(boxes, people * (640, 480, 640, 480), atol=0.1)
     assert found[0].score == pytest.approx(1.0 / (1.0 + np.exp(-4.0)))

@@ -26,6 +26,8 @@ FEWEST_SAMPLES = 3
 
 EDGE_SHARE = 0.10
 """Of a column's pixels in the middle 80 % of a box's height at least so many must be at a person's depth."""
+LEAST_PART = 0.5
+"""So much of a box's width must be left of it; of less it is somebody else's box."""
 
 
 def box_depth(
@@ -102,6 +104,8 @@ def seen_at(
     if columns.size == 0:
         return None
     part = max(u0, left + float(columns[0])), v0, min(u1, left + float(columns[-1]) + 1.0), v1
+    if part[2] - part[0] < LEAST_PART * (u1 - u0):
+        return None
     samples, whole = _valid_sorted(_grid(depth, part), nearest, farthest), _grid(depth, visible)
     before = np.count_nonzero((whole >= valid_range[0]) & (whole < nearest))
     if samples is None or before > np.count_nonzero((whole >= nearest) & (whole <= farthest)):

@@ -121,9 +121,11 @@ class Track:
         position: Estimate (x, y, z), or the prediction where nothing was measured, m; None unless tracking or coasting.
         velocity: Over ground (`odom`) or relative to the robot (`body`), along the robot's axes, m/s; None likewise.
         measurement: Position measured in this very frame and accepted, m; None without one. Never held.
-        box: Last accepted box, px, in company without what it shows of others; while confirming that of the person to be confirmed; else None.
+        box: Last accepted box, px, in company without what it shows of others; while confirming that of the person to
+            be confirmed; else None.
         confidence: The detector's for that box; None without one.
-        gate_distance: Between this frame's prediction and the accepted or else nearest detection, m; None without.
+        gate_distance: Between this frame's prediction and the accepted or else nearest detection that can be
+            measured, m; None without one.
         score: Log-similarity of the accepted detection, eq. (16); None without.
         failures: Processed frames in a row without the person.
         age: Since the last measurement, s; 0 in its frame. It stands when the tracker stops.

@@ -10,7 +10,6 @@ import pytest
 from tracker.association import GATE
 from tracker.detection.boxes import Detection
 from tracker.geometry import XTION_PRO, CameraMount, project
-from tracker.metrics import overlap
 from tracker.person_filter import arc, moved
 from tracker.person_tracker import PersonTracker, TrackerSettings
 

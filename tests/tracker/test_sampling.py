@@ -193,17 +193,26 @@ def test_who_steps_in_front_never_lends_the_hidden_one_a_depth(left):
 def test_a_box_of_two_people_is_cut_to_the_one_at_the_expected_depth(seed):
     """The target in front or beside, the other one beside it or behind it and looking out on one side."""
     rng = np.random.default_rng(seed)
-    left, width, gap = (int(n) for n in rng.integers((40, 24, -15), (60, 40, 15)))
-    target, other = (left, 20, left + width, 110), (left + width + gap, 25, left + 2 * width + gap, 100)
+    left, width, gap = (int(n) for n in rng.integers((40, 24, -15), (60, 40, 10)))
+    target, other = (left, 20, left + width, 110), (left + width + gap, 25, left + width + gap + 20, 100)
     if rng.random() < 0.5:
         target, other = ((160 - box[2], box[1], 160 - box[0], box[3]) for box in (target, other))
-    depth, boxes = show((target, 2.0), (other, 2.6))
+    depth, _ = show((target, 2.0), (other, 2.6))
     both = (min(target[0], other[0]), 20.0, max(target[2], other[2]), 110.0)
 
     part, z = seen_at(depth, both, 2.1, 0.3)
 
     assert z == 2.0
     assert (part[0], part[2]) == (target[0], target[2])
+
+
+@pytest.mark.parametrize("sliver", [5, 15])
+def test_a_box_with_a_sliver_of_another_person_is_not_that_person(sliver):
+    depth, (box, _) = show(((60, 20, 100, 110), 3.0), ((40, 10, 60 + sliver, 115), 2.0))
+    box = (60.0, *box[1:])
+
+    assert seen_at(depth, box, 2.0, 0.3) is None
+    assert seen_at(depth, box, 3.0, 0.3) == ((60.0 + sliver, *box[1:]), 3.0)
 
 
 def test_measurement_finds_a_person_where_it_stands():

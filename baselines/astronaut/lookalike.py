@@ -65,8 +65,8 @@ COLUMNS = (
 other one stays, m; frames are processed ones; `switches_hidden` of the switches began when the target was hidden;
 `gate_rejections` are frames with measured detections, none of them inside the gate; `least_visible` is the smallest
 visible share before the other one steps in; times in s, empty if there is none; `stop_time` counts from the occlusion's
-start; `seconds_visible` from the first confirmation on. `printed_...` are those of the paper's tracker to the letter, which
-takes its depth samples from the box whosoever they are."""
+start; `seconds_visible` from the first confirmation on. `printed_...` are those of the paper's tracker to the
+letter, which takes its depth samples from the box whosoever they are."""
 
 
 _TRACKERS = {"ours": "", "printed": "printed_"}

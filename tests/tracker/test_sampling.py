@@ -193,7 +193,7 @@ def test_who_steps_in_front_never_lends_the_hidden_one_a_depth(left):
 def test_a_box_of_two_people_is_cut_to_the_one_at_the_expected_depth(seed):
     """The target in front or beside, the other one beside it or behind it and looking out on one side."""
     rng = np.random.default_rng(seed)
-    left, width, gap = (int(n) for n in rng.integers((40, 24, -15), (60, 40, 10)))
+    left, width, gap = (int(n) for n in rng.integers((40, 32, -15), (60, 45, 10)))
     target, other = (left, 20, left + width, 110), (left + width + gap, 25, left + width + gap + 20, 100)
     if rng.random() < 0.5:
         target, other = ((160 - box[2], box[1], 160 - box[0], box[3]) for box in (target, other))

@@ -15,7 +15,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.association import GATE, Association, Candidate, associate
+from tracker.association import GATE, Association, Candidate, associate, between
 from tracker.detection.boxes import Detection
 from tracker.geometry import CAMERA_FRAME, CameraMount, Intrinsics, back_project
 from tracker.metrics import area, overlap
@@ -29,7 +29,7 @@ from tracker.person_filter import (
     arc,
     moved,
 )
-from tracker.sampling import Box, box_depth, depths_apart
+from tracker.sampling import Box, box_depth, seen_at
 
 State = Literal["searching", "confirming", "tracking", "coasting", "lost"]
 Twist = tuple[float, float]
@@ -58,8 +58,10 @@ class TrackerSettings:
         confirm_time: For so long a person must be detected without a miss to be tracked, s; at least two frames.
         stop_time: After so long without the person the tracker stops, s; at least one frame.
         gate: Largest distance between a measurement and its prediction, m, eq. (15).
-        depth: Of people whose boxes overlap: `apart` takes no sample that belongs to somebody nearer, `printed` takes
-            the six smallest whosoever they are. As printed the tracker drifts to whoever steps before its target.
+        company: What is done once others have been detected: `apart` reads a box only where it is at the predicted
+            depth (`seen_at`), leaves out boxes between two people (`between`) and weighs places by their likelihood
+            (`associate`); `printed` goes on as with one person. As printed the tracker drifts to whoever steps before
+            its target. With one person there is no difference.
         frame: In which frame the person's velocity is taken to be constant: `odom`, the ground, or `body`, the robot,
             as printed. A turning robot is no frame for a constant velocity.
         smoothing: Eq. (9), see `PersonFilter`.
@@ -67,8 +69,8 @@ class TrackerSettings:
         measurement_noise: Of the filter, m².
 
     Raises:
-        ValueError: If a number is not positive and finite, `every` is not a whole number, or `depth` or `frame` is not
-            known.
+        ValueError: If a number is not positive and finite, `every` is not a whole number, or `company` or `frame` is
+            not known.
     """
 
     rate: float = 30.0
@@ -76,7 +78,7 @@ class TrackerSettings:
     confirm_time: float = 0.5
     stop_time: float = 1.0
     gate: float = GATE
-    depth: Literal["apart", "printed"] = "apart"
+    company: Literal["apart", "printed"] = "apart"
     frame: Literal["odom", "body"] = "odom"
     smoothing: bool = True
     acceleration_density: float = ACCELERATION_DENSITY
@@ -89,8 +91,8 @@ class TrackerSettings:
                 raise ValueError(f"tracker {name} is {value!r}, expected a positive finite number.")
         if self.every != int(self.every):
             raise ValueError(f"tracker every is {self.every!r}, expected a whole number of frames.")
-        if self.depth not in ("apart", "printed"):
-            raise ValueError(f"tracker depth is {self.depth!r}, expected 'apart' or 'printed'.")
+        if self.company not in ("apart", "printed"):
+            raise ValueError(f"tracker company is {self.company!r}, expected 'apart' or 'printed'.")
         if self.frame not in ("odom", "body"):
             raise ValueError(f"tracker frame is {self.frame!r}, expected 'odom' or 'body'.")
 
@@ -119,9 +121,11 @@ class Track:
         position: Estimate (x, y, z), or the prediction where nothing was measured, m; None unless tracking or coasting.
         velocity: Over ground (`odom`) or relative to the robot (`body`), along the robot's axes, m/s; None likewise.
         measurement: Position measured in this very frame and accepted, m; None without one. Never held.
-        box: Last accepted box, px; while confirming that of the person to be confirmed; else None.
+        box: Last accepted box, px, in company without what it shows of others; while confirming that of the person to
+            be confirmed; else None.
         confidence: The detector's for that box; None without one.
-        gate_distance: Between this frame's prediction and the accepted or else nearest detection, m; None without.
+        gate_distance: Between this frame's prediction and the accepted or else nearest detection that can be
+            measured, m; None without one.
         score: Log-similarity of the accepted detection, eq. (16); None without.
         failures: Processed frames in a row without the person.
         age: Since the last measurement, s; 0 in its frame. It stands when the tracker stops.
@@ -203,6 +207,7 @@ class PersonTracker:
         self._samples: list[Vector] = []
         self._last: Candidate | None = None
         self._failures, self._age = 0, 0.0
+        self._in_company = False
 
     def update(self, rgb: NDArray[np.uint8], depth: NDArray[np.float32], twist: Twist = (0.0, 0.0)) -> Track:
         """Take in a frame. A depth without any reading is no error: nobody can be measured in it.
@@ -246,7 +251,8 @@ class PersonTracker:
 
     def _follow(self, filter_: PersonFilter, candidates: list[Candidate]) -> Association:
         assert self._last is not None
-        found = associate(candidates, filter_.position, self._last.box, self._size, self._settings.gate)
+        variance = filter_.covariance[0] + self._settings.measurement_noise if self._in_company else None
+        found = associate(candidates, filter_.position, self._last.box, self._size, self._settings.gate, variance)
         if found.chosen is not None:
             filter_.update(found.chosen.position)
             self._accept(found.chosen)
@@ -306,21 +312,32 @@ class PersonTracker:
 
     def _candidates(self, rgb: NDArray[np.uint8], depth: NDArray[np.float32]) -> list[Candidate]:
         """Return the detections that have a depth, with their boxes clipped to the picture."""
-        width, height = self._size
-        found = []
         detections = self._detector.detect(rgb, depth)
-        boxes = [detection.box for detection in detections]
-        apart = self._settings.depth == "apart"
-        depths = depths_apart(depth, boxes) if apart else [box_depth(depth, box) for box in boxes]
-        for detection, z in zip(detections, depths, strict=True):
-            if z is not None:
-                u0, v0, u1, v1 = detection.box
-                box = (max(u0, 0.0), max(v0, 0.0), min(u1, float(width)), min(v1, float(height)))
+        if self._settings.company == "apart":
+            self._in_company |= len(detections) > 1
+            boxes = [detection.box for detection in detections]
+            detections = [d for k, d in enumerate(detections) if not between(d.box, boxes[:k] + boxes[k + 1 :])]
+        found = []
+        for detection in detections:
+            seen = self._seen(depth, detection.box)
+            if seen is not None:
+                box, z = seen
                 right, down, forward = back_project(
                     (box[0] + box[2]) / 2.0, (box[1] + box[3]) / 2.0, z, self._intrinsics, self._mount
                 )
                 found.append(Candidate(box, detection.score, (forward, -right, -down)))
         return found
+
+    def _seen(self, depth: NDArray[np.float32], box: Box) -> tuple[Box, float] | None:
+        """Return what a box shows of the person, inside the picture, and at which depth."""
+        expected = self._filter.position if self._filter is not None else self._samples[-1] if self._samples else None
+        if self._in_company and expected is not None:
+            return seen_at(depth, box, expected[0] - self._mount.forward, self._settings.gate)
+        z = box_depth(depth, box)
+        if z is None:
+            return None
+        width, height = self._size
+        return (max(box[0], 0.0), max(box[1], 0.0), min(box[2], float(width)), min(box[3], float(height))), z
 
     def _track(self, found: Association, processed: bool) -> Track:
         tracking = self._filter is not None

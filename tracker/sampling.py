@@ -7,7 +7,7 @@ range are dropped. Fewer than three valid samples make no measurement.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from types import MappingProxyType
 from typing import Literal
 
@@ -24,8 +24,10 @@ VALID_RANGE = (0.5, 8.0)
 
 FEWEST_SAMPLES = 3
 
-IN_FRONT = 0.15
-"""By so much a person's samples must be nearer than those of one whose box surrounds theirs, m: half a body."""
+EDGE_SHARE = 0.10
+"""Of a column's pixels in the middle 80 % of a box's height at least so many must be at a person's depth."""
+LEAST_PART = 0.5
+"""So much of a box's width must be left of it; of less it is somebody else's box."""
 
 
 def box_depth(
@@ -68,70 +70,47 @@ def box_depth(
     return None if visible is None else sample(depth, visible, nearest, farthest)
 
 
-def depths_apart(
-    depth: NDArray[np.float32], boxes: Sequence[Box], valid_range: tuple[float, float] = VALID_RANGE
-) -> list[float | None]:
-    """Return the depth of each box by paper A's rule, less the samples that belong to somebody nearer.
+def seen_at(
+    depth: NDArray[np.float32],
+    box: Box,
+    expected: float,
+    reach: float,
+    valid_range: tuple[float, float] = VALID_RANGE,
+) -> tuple[Box, float] | None:
+    """Return the part of a box that shows a person at an expected depth, and its depth m; None if it shows another.
 
-    Where boxes overlap, the six smallest samples of the farther one are the nearer person's. A tracker that takes them
-    drifts to whoever steps before its target, inside the gate all the way. So a box loses its samples inside the box of
-    a nearer one. Who is nearer shows in the part that each box has for itself; a box that has none lies inside the
-    others and counts as behind them unless its samples are nearer by `IN_FRONT`.
+    Of two people close to each other a detector's boxes are seldom those of one: they take in part of the neighbour or
+    both. The middle of such a box and the six smallest of its samples are then nobody's, and a tracker that takes them
+    drifts from one person to the other, inside the gate all the way. So the box is cut on its left and right to the
+    columns at the expected depth, and only samples at that depth are taken. Where more of them are nearer, somebody
+    else stands before the person.
 
     Args:
         depth: As in `box_depth`.
-        boxes: As in `box_depth`; one that overlaps no other has the depth that `box_depth` gives.
+        box: As in `box_depth`.
+        expected: Depth at which the person should be, m.
+        reach: So much nearer or farther a sample may be, m.
         valid_range: As in `box_depth`.
     """
-    depths = [box_depth(depth, box, valid_range=valid_range) for box in boxes]
-    for i, box in enumerate(boxes):
-        hiding = [other for j, other in enumerate(boxes) if j != i and _hides(depth, other, box, valid_range)]
-        if hiding and depths[i] is not None:
-            visible = _clipped(box, depth.shape[1], depth.shape[0])
-            assert visible is not None
-            samples = _outside(depth, *_grid_places(visible), hiding, valid_range)
-            depths[i] = None if samples is None else _mean(samples[:6])
-    return depths
-
-
-def _hides(depth: NDArray[np.float32], one: Box, other: Box, valid_range: tuple[float, float]) -> bool:
-    """Return whether one box overlaps the other and shows somebody nearer."""
-    if not (one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]):
-        return False
-    own, others_own = _front(depth, one, other, valid_range), _front(depth, other, one, valid_range)
-    if own is not None and others_own is not None:
-        return own < others_own
-    whole = _front(depth, one if own is None else other, None, valid_range)
-    if whole is None or own is others_own:
-        return False
-    return whole > own - IN_FRONT if own is not None else whole <= others_own - IN_FRONT  # type: ignore[operator]
-
-
-def _front(depth: NDArray[np.float32], box: Box, less: Box | None, valid_range: tuple[float, float]) -> float | None:
-    """Return the mean of the six smallest of many samples of a box, outside another; None if there are too few."""
     visible = _clipped(box, depth.shape[1], depth.shape[0])
     if visible is None:
         return None
+    nearest, farthest = max(expected - reach, valid_range[0]), min(expected + reach, valid_range[1])
     u0, v0, u1, v1 = visible
-    columns = (u0 + (u1 - u0) * _FINE_FRACTIONS).astype(np.intp)
-    rows = (v0 + (v1 - v0) * _FINE_FRACTIONS).astype(np.intp)
-    samples = _outside(depth, columns, rows, [less] if less else [], valid_range)
-    return None if samples is None else _mean(samples[:6])
-
-
-def _outside(
-    depth: NDArray[np.float32],
-    columns: NDArray[np.intp],
-    rows: NDArray[np.intp],
-    boxes: Sequence[Box],
-    valid_range: tuple[float, float],
-) -> NDArray[np.float32] | None:
-    """Return the valid samples at the crossings of columns and rows that lie in none of the boxes, ascending."""
-    free = np.ones((rows.size, columns.size), np.bool_)
-    for u0, v0, u1, v1 in boxes:
-        across, down = (columns + 1 > u0) & (columns < u1), (rows + 1 > v0) & (rows < v1)
-        free &= ~(down[:, None] & across)
-    return _valid_sorted(depth[rows[:, None], columns][free], *valid_range)
+    left, margin = int(u0), 0.1 * (v1 - v0)
+    middle = depth[int(v0 + margin) : math.ceil(v1 - margin), left : math.ceil(u1)]
+    there = np.count_nonzero((middle >= nearest) & (middle <= farthest), axis=0)
+    columns = np.flatnonzero(there >= EDGE_SHARE * middle.shape[0])
+    if columns.size == 0:
+        return None
+    part = max(u0, left + float(columns[0])), v0, min(u1, left + float(columns[-1]) + 1.0), v1
+    if part[2] - part[0] < LEAST_PART * (u1 - u0):
+        return None
+    samples, whole = _valid_sorted(_grid(depth, part), nearest, farthest), _grid(depth, visible)
+    before = np.count_nonzero((whole >= valid_range[0]) & (whole < nearest))
+    if samples is None or before > np.count_nonzero((whole >= nearest) & (whole <= farthest)):
+        return None
+    return part, _mean(samples[:6])
 
 
 def measure(
@@ -197,20 +176,14 @@ RULES: MappingProxyType[str, Callable[[NDArray[np.float32], Box, float, float], 
 """The sampling rules by name."""
 
 _GRID_FRACTIONS = np.array([0.20, 0.35, 0.50, 0.65, 0.80])
-_FINE_FRACTIONS = (np.arange(20) + 0.5) / 20.0
 
 
 def _grid(depth: NDArray[np.float32], box: Box) -> NDArray[np.float32]:
     """Return the (5, 5) samples spread over the central 60 % of a box inside the picture."""
-    columns, rows = _grid_places(box)
-    return depth[rows[:, None], columns]
-
-
-def _grid_places(box: Box) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the columns and the rows of the grid's pixels, (5,) each."""
     u0, v0, u1, v1 = box
     columns = (u0 + (u1 - u0) * _GRID_FRACTIONS).astype(np.intp)
-    return columns, (v0 + (v1 - v0) * _GRID_FRACTIONS).astype(np.intp)
+    rows = (v0 + (v1 - v0) * _GRID_FRACTIONS).astype(np.intp)
+    return depth[rows[:, None], columns]
 
 
 def _valid_sorted(samples: NDArray[np.float32], nearest: float, farthest: float) -> NDArray[np.float32] | None:

@@ -9,8 +9,9 @@ true box more than the target's, and at nobody's if it overlaps neither. A switc
 frame from which it stays hidden for longer than a second. A stop while it is visible is a false one; if the target is
 nearly whole then, a person names it again, as the paper's alarm asks for.
 
-**Two trackers** see the same detections: ours, and the paper's to the letter, which reads the depth of whoever steps
-before the target out of the target's box, follows that depth inside the gate, and so adopts the other person.
+**Two trackers** see the same detections: ours, which in company reads boxes only where they are at the target's depth,
+and the paper's to the letter, which reads the depth of whoever steps before the target out of the target's box, follows
+that depth inside the gate, and so adopts the other person. Ours reports boxes without what they show of others.
 """
 
 from __future__ import annotations
@@ -62,10 +63,10 @@ COLUMNS = (
 )
 """Of a row. `distance` of the target, `gap` between the two when close and `step_in`, how far before the target the
 other one stays, m; frames are processed ones; `switches_hidden` of the switches began when the target was hidden;
-`gate_rejections` are frames with detections, none of which was inside the gate; `least_visible` is the smallest visible
-share before the other one steps in; times in s, empty if there is none; `stop_time` counts from the occlusion's start;
-`seconds_visible` from the first confirmation on. `printed_...` are those of the paper's tracker to the letter, which
-takes its depth samples from the box whosoever they are."""
+`gate_rejections` are frames with measured detections, none of them inside the gate; `least_visible` is the smallest
+visible share before the other one steps in; times in s, empty if there is none; `stop_time` counts from the occlusion's
+start; `seconds_visible` from the first confirmation on. `printed_...` are those of the paper's tracker to the
+letter, which takes its depth samples from the box whosoever they are."""
 
 
 _TRACKERS = {"ours": "", "printed": "printed_"}
@@ -140,7 +141,7 @@ def table(rows: Sequence[Mapping[str, Value]]) -> str:
         lines += [_table_line(str(perception), name, prefix, chosen) for name, prefix in _TRACKERS.items()]
     lines += [
         "",
-        "`ours` takes no depth sample of somebody nearer, `printed` is the paper's to the letter. A switch is a frame "
+        "`ours` reads boxes only at the target's depth, `printed` is the paper's to the letter. A switch is a frame "
         "in which another person's box is accepted after one in which the target's was. The target is hidden when "
         f"less than {100 * HALF:.0f} % of its pixels are visible for longer than {HIDDEN_TIME:g} s; times count from "
         "then, in s. Intervals are Wilson's. Share stopped: of the episodes in which the target was hidden.",
@@ -226,10 +227,11 @@ def _draw_frame(axes: Axes, frame: Frame) -> None:
     from matplotlib.patches import Rectangle
 
     tracked = frame.track.box if frame.track.measurement is not None else None
+    most = max((overlap(detection.box, tracked) for detection in frame.found), default=0.0) if tracked else 0.0
     axes.imshow(frame.shown.rgb)
     for detection in frame.found:
         u0, v0, u1, v1 = detection.box
-        is_target = tracked is not None and overlap(detection.box, tracked) > 0.99
+        is_target = tracked is not None and overlap(detection.box, tracked) == most
         colour, width = (_GREEN, 2.4) if is_target else (_VERMILION, 1.2)
         axes.add_patch(Rectangle((u0, v0), u1 - u0, v1 - v0, edgecolor=colour, facecolor="none", linewidth=width))
     axes.set_xlim(0, frame.shown.rgb.shape[1])

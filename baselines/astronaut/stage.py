@@ -28,8 +28,8 @@ from tracker.sampling import Box
 CAMERA = CameraPose(-3.9, 0.0, 1.0, 0.0)
 """The camera hovers at one end of the cabin, half way up, and looks along it."""
 SETTINGS = TrackerSettings()
-"""Of the tracker: the paper's, but for the depth of people whose boxes overlap."""
-PRINTED = dataclasses.replace(SETTINGS, depth="printed")
+"""Of the tracker: the paper's, but for what it does in company."""
+PRINTED = dataclasses.replace(SETTINGS, company="printed")
 """The paper's to the letter."""
 PERIOD = SETTINGS.every / SETTINGS.rate
 """Between two processed frames, s."""

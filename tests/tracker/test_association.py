@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tracker.association import Candidate, associate, log_similarity
+from tracker.association import COVERED, Candidate, associate, between, log_similarity
 
 SIZE = (320, 240)
 BOX = (100.0, 60.0, 160.0, 220.0)
@@ -84,6 +84,61 @@ def test_random_candidates_against_brute_force():
             assert found.chosen is candidates[int(np.argmax(posterior))]
             assert found.distance == pytest.approx(distances[int(np.argmax(posterior))])
     assert 100 < accepted < 400
+
+
+def test_with_a_variance_the_place_counts_by_its_gaussian_likelihood():
+    rng = np.random.default_rng(3)
+    differ = 0
+    for _ in range(300):
+        prediction = rng.normal(0, 1, 3)
+        candidates = []
+        for _ in range(3):
+            u0, v0 = rng.uniform(0, 250), rng.uniform(0, 180)
+            box = (u0, v0, u0 + rng.uniform(10, 60), v0 + rng.uniform(10, 60))
+            candidates.append(at(tuple(prediction + rng.uniform(-0.17, 0.17, 3)), box))
+
+        found = associate(candidates, tuple(prediction), BOX, SIZE, variance=0.05**2)
+
+        density = [
+            math.exp(log_similarity(c.box, BOX, SIZE))
+            * math.prod(math.exp(-(((a - b) / 0.05) ** 2) / 2) for a, b in zip(c.position, prediction, strict=True))
+            for c in candidates
+        ]
+        best = candidates[int(np.argmax(density))]
+        assert found.chosen is best
+        assert found.log_score == pytest.approx(log_similarity(best.box, BOX, SIZE))
+        differ += best is not associate(candidates, tuple(prediction), BOX, SIZE).chosen
+    assert differ > 50
+
+
+def test_a_box_between_two_others_is_the_one_that_both_cover():
+    left, right = (20.0, 40.0, 80.0, 200.0), (85.0, 50.0, 150.0, 200.0)
+    bridge = (50.0, 45.0, 120.0, 200.0)
+
+    assert between(bridge, [right, left])
+    assert not between(left, [bridge, right])
+    assert not between(right, [left, bridge])
+    assert not between(bridge, [left])
+    assert not between(bridge, [left, (200.0, 40.0, 260.0, 200.0)])
+    assert not between(bridge, [])
+
+
+def test_how_much_two_boxes_cover_is_what_counting_pixels_says():
+    rng = np.random.default_rng(4)
+    agreed = []
+    for _ in range(2000):
+        edges = np.sort(rng.integers(0, 40, (3, 2, 2)), axis=2) + np.array([0, 1])
+        box, *others = [tuple(map(float, (u[0], v[0], u[1], v[1]))) for u, v in edges]
+        counts = np.zeros((42, 42), int)
+        for u, v in edges[1:]:
+            counts[v[0] : v[1], u[0] : u[1]] += 1
+        u, v = edges[0]
+        covered = float((counts[v[0] : v[1], u[0] : u[1]] > 0).mean())
+        order = sorted(others)
+        sides = order[0][0] < box[0] and order[0][2] < box[2] and order[1][0] > box[0] and order[1][2] > box[2]
+        assert between(box, others) == (sides and covered >= COVERED)
+        agreed.append(between(box, others))
+    assert 10 < sum(agreed) < 1000
 
 
 @pytest.mark.parametrize("box", [(10.0, 10.0, 10.0, 20.0), (20.0, 10.0, 10.0, 20.0), (0.0, 0.0, math.nan, 5.0)])

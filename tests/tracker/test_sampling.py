@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tracker.geometry import XTION_PRO, project
-from tracker.sampling import RULES, box_depth, depths_apart, measure
+from tracker.sampling import RULES, box_depth, measure, seen_at
 
 GRID = (2, 3, 5, 6, 8)  # rows and columns of the 5x5 grid in a box over a 10x10 picture
 WHOLE = (0.0, 0.0, 10.0, 10.0)
@@ -161,11 +161,14 @@ def show(*people):
     return depth, boxes
 
 
-def test_people_apart_have_the_depths_of_their_boxes():
-    depth, boxes = show(((10, 20, 50, 110), 3.0), ((80, 20, 120, 110), 2.0))
+def test_alone_a_person_is_all_of_its_box():
+    depth, (box,) = show(((60, 20, 100, 110), 2.0))
 
-    assert depths_apart(depth, boxes) == [box_depth(depth, box) for box in boxes] == [3.0, 2.0]
-    assert depths_apart(depth, []) == []
+    for expected in (1.75, 2.0, 2.25):
+        assert seen_at(depth, box, expected, 0.3) == (box, box_depth(depth, box)) == (box, 2.0)
+    assert seen_at(depth, box, 2.5, 0.3) is None
+    assert seen_at(np.zeros_like(depth), box, 2.0, 0.3) is None
+    assert seen_at(depth, (-20.0, 0.0, -1.0, 50.0), 2.0, 0.3) is None
 
 
 @pytest.mark.parametrize("left", range(-30, 31, 5))
@@ -176,32 +179,40 @@ def test_who_steps_in_front_never_lends_the_hidden_one_a_depth(left):
         target = ((55, 20, 105, 100), 3.0)
     depth, boxes = show(target, other)
 
-    of_target, of_other = depths_apart(depth, boxes)
-    assert of_target in (3.0, 5.0, None)
-    assert of_other == 2.0
+    of_target = seen_at(depth, boxes[0], 3.0, 0.3)
+    assert seen_at(depth, boxes[1], 3.0, 0.3) is None
+    assert of_target is None or of_target[1] == 3.0
     if abs(left) >= 20:
-        assert of_target == 3.0
-    swapped = depths_apart(depth, boxes[::-1])
-    assert swapped == [of_other, of_target]
+        assert of_target == (boxes[0], 3.0)
+    if left == 0:
+        assert box_depth(depth, boxes[0]) == 2.0
+        assert of_target is None
 
 
-def test_as_printed_the_hidden_one_gets_the_depth_of_who_hides_it():
-    depth, boxes = show(((55, 20, 105, 100), 3.0), ((60, 10, 100, 115), 2.0))
+@pytest.mark.parametrize("seed", range(20))
+def test_a_box_of_two_people_is_cut_to_the_one_at_the_expected_depth(seed):
+    """The target in front or beside, the other one beside it or behind it and looking out on one side."""
+    rng = np.random.default_rng(seed)
+    left, width, gap = (int(n) for n in rng.integers((40, 32, -15), (60, 45, 10)))
+    target, other = (left, 20, left + width, 110), (left + width + gap, 25, left + width + gap + 20, 100)
+    if rng.random() < 0.5:
+        target, other = ((160 - box[2], box[1], 160 - box[0], box[3]) for box in (target, other))
+    depth, _ = show((target, 2.0), (other, 2.6))
+    both = (min(target[0], other[0]), 20.0, max(target[2], other[2]), 110.0)
 
-    assert box_depth(depth, boxes[0]) == 2.0
-    assert depths_apart(depth, boxes)[0] != 2.0
+    part, z = seen_at(depth, both, 2.1, 0.3)
+
+    assert z == 2.0
+    assert (part[0], part[2]) == (target[0], target[2])
 
 
-def test_a_person_in_front_of_another_whose_box_surrounds_it_keeps_its_depth():
-    depth, boxes = show(((60, 40, 100, 110), 2.0), ((50, 20, 110, 110), 3.0))
+@pytest.mark.parametrize("sliver", [5, 15])
+def test_a_box_with_a_sliver_of_another_person_is_not_that_person(sliver):
+    depth, (box, _) = show(((60, 20, 100, 110), 3.0), ((40, 10, 60 + sliver, 115), 2.0))
+    box = (60.0, *box[1:])
 
-    assert depths_apart(depth, boxes) == [2.0, 3.0]
-
-
-def test_two_boxes_of_one_person_both_have_its_depth():
-    depth, (box,) = show(((60, 20, 100, 110), 2.0))
-
-    assert depths_apart(depth, [box, box]) == [2.0, 2.0]
+    assert seen_at(depth, box, 2.0, 0.3) is None
+    assert seen_at(depth, box, 3.0, 0.3) == ((60.0 + sliver, *box[1:]), 3.0)
 
 
 def test_measurement_finds_a_person_where_it_stands():

@@ -1,5 +1,6 @@
 """Paper A's second experiment with perfect boxes: no switch, a stop a second after the target is hidden."""
 
+import dataclasses
 import math
 from collections import deque
 from itertools import islice
@@ -9,7 +10,7 @@ import pytest
 from baselines.astronaut.experiments import Part, Player, Rows
 from baselines.astronaut.lookalike import COLUMNS, HALF, film, play, table
 from baselines.astronaut.script import OTHER, TARGET, Cast, draw_script
-from baselines.astronaut.stage import Stage, stage
+from baselines.astronaut.stage import CAMERA, Stage, stage
 from tracker.detection.boxes import Detection
 
 SEEDS = (2, 15)
@@ -36,6 +37,20 @@ def test_it_stops_about_a_second_after_the_target_is_hidden(rows):
     for row in rows:
         assert row["occlusion_start"] > row["step_in_time"]
         assert 0.5 <= row["stop_time"] <= 1.3
+
+
+def test_whose_place_was_measured_is_told_by_the_bodies():
+    """At each one's own middle, just nearer to one, and out of reach of both."""
+    frame = next(frame for frame in film(SEEDS[0]) if len(frame.people) == 2)
+    middles = [person.vertices.mean(axis=0) - (CAMERA.x, CAMERA.y, 0.0) for person in frame.people]
+
+    def at(place):
+        return frame.followed(dataclasses.replace(frame.track, measurement=tuple(map(float, place))))
+
+    assert [at(middle) for middle in middles] == ["target", "other"]
+    assert at(middles[0] + 0.6 * (middles[1] - middles[0]) / math.dist(*middles)) == "target"
+    assert at(middles[0] + (0.0, 9.0, 0.0)) == "nobody"
+    assert frame.followed(dataclasses.replace(frame.track, measurement=None)) is None
 
 
 def test_the_printed_tracker_follows_who_steps_in(rows):
@@ -96,8 +111,8 @@ def test_who_tracks_the_other_one_is_found_out(monkeypatch):
     row = play(SEEDS[0], Blinkered())
 
     assert row["perception"] == "detector"
-    assert row["wrong_frames"] == row["tracked_frames"] > 50
-    assert row["switches"] == 0
+    assert row["tracked_frames"] > 50
+    assert row["wrong_frames"] > 0.8 * row["tracked_frames"]  # in the rest the target's depth is in the other's box
     (line,) = [line for line in table([row]).splitlines() if line.startswith("| detector | ours | 1 | 1 (")]
     assert "| 0 (0.0 %) |" in line
 

@@ -40,7 +40,10 @@ DOMAINS = tuple(
     Domain(scene, share, settings)
     for scene in ("corridor", "indoor")
     for share, settings in (
-        (0.25, ()),
+        (0.125, ()),
+        (0.05, (("walking_speed", 0.5),)),
+        (0.025, (("walking_speed", 0.75),)),
+        (0.05, (("walking_speed", 1.1),)),
         (0.05, (("route", "straight"),)),
         (0.05, (("route", "standing"),)),
         (0.05, (("latency_s", 2.0 / 30.0),)),
@@ -48,7 +51,7 @@ DOMAINS = tuple(
         (0.05, (("sensor", _OUTLIERS),)),
     )
 )
-"""Half of the worlds are the environments as they come; the others vary route, latency and sensor."""
+"""A quarter of the worlds are the environments as they come; the others vary walking speed, route, latency, sensor."""
 PLAIN_DOMAINS = (Domain("corridor", 0.5), Domain("indoor", 0.5))
 
 
@@ -166,7 +169,7 @@ RECIPES: dict[str, Recipe] = {
         initial_log_std=-1.6,
         cloned_pictures=40_000,
     ),
-    "recurrent_ppo": RecurrentPPORecipe(steps=2_000_000),
+    "recurrent_ppo": RecurrentPPORecipe(steps=4_000_000),
     "sac": SACRecipe(),
 }
 """Recipe by the name that `follow train` takes."""

@@ -15,7 +15,6 @@ from baselines.calibration import NoiseModel, Pair, detector_settings, noise_mod
 from baselines.floors import FLOORS
 from baselines.policy import OBSERVATION_OF, Policy, make_follower
 from follow_env.config import CameraConfig, choose
-from follow_env.routes import PAPER_SPEED
 from tracker.person_tracker import Detector
 
 if TYPE_CHECKING:
@@ -60,7 +59,7 @@ def cell_of(policy: str, scene: str) -> Cell:
 def environment_kwargs(cell: Cell, camera: Mapping[str, int] = CAMERA) -> dict[str, Any]:
     """Return what `FollowEnv` is made with for a cell; `camera` is for the `mask` and `detector` rungs."""
     kwargs: dict[str, Any] = {"scene": cell.scene}
-    if cell.walking_speed != PAPER_SPEED:
+    if cell.walking_speed is not None:
         kwargs["walking_speed"] = cell.walking_speed
     if cell.perception == PIXELS:
         return {**kwargs, "obs": "rgbd_uint8", "camera": dict(PICTURE)}

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from follow_env.routes import PAPER_SPEED, check_walking_speed
-
 PERCEPTIONS = ("truth", "emulated", "mask", "detector")
 """The rungs of Table 1, from best to real."""
 PIXELS = "pixels"
@@ -41,7 +39,7 @@ class Cell:
         alpha: Significance of the adaptive filter's outlier test.
         sensor: Name of the emulated sensor, or the depth rule of ``mask`` and ``detector``; empty takes that of
             ``SENSORS``.
-        walking_speed: Of the person, m/s.
+        walking_speed: Of the person, m/s; None is the paper's.
     """
 
     perception: str
@@ -51,7 +49,7 @@ class Cell:
     q_scale: float = 1.0
     alpha: float = 0.05
     sensor: str = ""
-    walking_speed: float = PAPER_SPEED
+    walking_speed: float | None = None
 
     def __post_init__(self) -> None:
         for field, value, known in (
@@ -67,7 +65,6 @@ class Cell:
             raise ValueError(f"q_scale is {self.q_scale}, but a multiple of Q must be positive and finite.")
         if not 0.0 < self.alpha < 1.0:
             raise ValueError(f"alpha is {self.alpha}, but a significance must lie between 0 and 1.")
-        check_walking_speed(self.walking_speed)
 
     @property
     def key(self) -> str:
@@ -75,7 +72,7 @@ class Cell:
         return (
             f"{self.perception}/{self.scene}/{self.estimator}/{self.controller}"
             f"/q{float(self.q_scale)!r}/a{float(self.alpha)!r}/{self.sensor}"
-            + ("" if self.walking_speed == PAPER_SPEED else f"/w{self.walking_speed!r}")
+            + ("" if self.walking_speed is None else f"/w{self.walking_speed!r}")
         )
 
 

@@ -90,7 +90,7 @@ def bench(
 
     def write(store: Store) -> tuple[str, Played]:
         played = {cell: [store.episode(cell, seed) for seed in seeds] for cell, seeds in plan.items()}
-        speeds = [cell.walking_speed for cell, seeds in plan.items() for _ in seeds]
+        speeds = [cell.walking_speed or PAPER_SPEED for cell, seeds in plan.items() for _ in seeds]
         walked = [{"walking_speed": speed, **row} for speed, row in zip(speeds, rows(played), strict=True)]
         write_csv(out / "episodes.csv", ("walking_speed", *metrics.COLUMNS), walked)
         found = records({cell: [one.row for one in group] for cell, group in played.items()})
@@ -113,7 +113,7 @@ def records(played: Mapping[Cell, Sequence[Row]]) -> list[dict[str, Value]]:
         ended = [
             {**row, "collided": int(row["ended"] == "collision"), "lost": int(row["ended"] == "lost")} for row in group
         ]
-        groups.setdefault((cell.scene, cell.walking_speed, policy_name(cell)), []).append(ended)
+        groups.setdefault((cell.scene, cell.walking_speed or PAPER_SPEED, policy_name(cell)), []).append(ended)
     scores = {
         key: {name: Score.of(trainings, *how) for name, how in SCORES.items()} for key, trainings in groups.items()
     }

@@ -16,6 +16,7 @@ from baselines.benchmark.followers import cells, speed_cells
 from baselines.learned.agents import SUFFIX, load_agent, save_agent, shipped, weights_file
 from baselines.learned.recipes import RECIPES
 from follow_env.env import FollowEnv
+from follow_env.routes import PAPER_SPEED
 
 RUN = Path(__file__).parents[3] / "results" / "followers"
 AGENTS = shipped()
@@ -51,7 +52,7 @@ def test_a_shipped_agent_drives_as_it_did(name: str) -> None:
     player = Player()
     mine = [cell for cell in [*cells([name]), *speed_cells([name])] if cell.controller == name]
     for cell in mine[:1] if "pixels" in name else [*mine[:2], mine[-1]]:  # both scenes, and the fastest person
-        wanted = (name, cell.scene, str(cell.walking_speed), "3")
+        wanted = (name, cell.scene, str(cell.walking_speed or PAPER_SPEED), "3")
         (line,) = (r for r in committed if (r["controller"], r["scene"], r["walking_speed"], r["seed"]) == wanted)
         for column, value in player(cell, 3).row.items():
             if isinstance(value, float):

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from follow_env.config import choose
-from tracker.detection.boxes import Detection, nms, vote
+from tracker.detection.boxes import Detection, area, nms, vote
 from tracker.detection.networks import DEPTH_RANGE, NETS, MultiBoxNet
 from tracker.detection.priors import INPUT_SIZE, decode, prior_boxes
 from tracker.detection.weights import load_network
@@ -120,6 +120,8 @@ def read(
     width, height = size
     boxes = np.clip(decode(offsets[likely], priors[likely]), 0.0, 1.0) * (width, height, width, height)
     boxes, scores = _rounded(boxes, grid), scores[likely]
+    inside = area(boxes) > 0.0  # of a box beside the picture nothing is left
+    boxes, scores = boxes[inside], scores[inside]
     best = nms(boxes, scores, OVERLAP)
     agreed, scores = _rounded(vote(boxes[best], boxes, scores, AGREEMENT), grid), scores[best]
     return [Detection(tuple(agreed[k].tolist()), float(scores[k])) for k in nms(agreed, scores, AGREEMENT)]

@@ -63,6 +63,14 @@ def test_boxes_beyond_the_edge_are_cut() -> None:
     np.testing.assert_allclose(found.box, (0.0, 60.0, 60.0, 300.0), atol=1e-3)
 
 
+def test_boxes_beside_the_picture_are_nobody() -> None:
+    box = np.array([[-0.4, 0.2, -0.01, 0.8]])
+    logits, offsets = np.full((len(PRIORS), 2), (9.0, -9.0)), np.zeros((len(PRIORS), 4))
+    offsets[0], logits[0] = encode(box, PRIORS[:1]), (-9.0, 9.0)
+    with np.errstate(all="raise"):
+        assert read(logits, offsets, PRIORS, (300, 300), 0.5) == []
+
+
 def test_the_input_is_squashed_and_depth_becomes_a_fourth_colour() -> None:
     depth = np.full((240, 320), 4.0, np.float32)
     depth[:, :160] = 0.0

@@ -17,8 +17,12 @@ VARIANCES = (0.1, 0.2)
 """Divisors of the coded centre and of the coded size (SSD)."""
 MATCH_OVERLAP = 0.5
 """Least overlap at which a prior has to find a person (paper A, figure 8; SSD)."""
-NEAR_OVERLAP = 0.4
-"""Least overlap at which a prior may find a person: what it says then is suppressed by the better ones anyway."""
+NEAR_OVERLAP, NEAR_SHARE = 0.4, 0.8
+"""Least overlap at which a prior may find a person, and least share of the greatest that a prior has with that person:
+what it says then is suppressed by the better ones anyway."""
+OWN_PRIORS, OWN_OVERLAP = 3, 0.2
+"""So many of the priors that overlap a person most have to find it, if they overlap it by this at least (Zhang et al.,
+S3FD, 2017): somebody thin or far away would be learned by a single one."""
 POSITIVE, NEGATIVE, IGNORED = 1, 0, -1
 """Labels of priors: person, background, neither (it overlaps a person a little too little, or one too hard to see)."""
 
@@ -130,8 +134,9 @@ def match(boxes: np.ndarray, difficult: np.ndarray, priors: np.ndarray) -> Targe
 
     As SSD: the best pair of a person and a prior is joined, then the best of what is left, until every person has a
     prior of its own; then each prior that overlaps a person by `MATCH_OVERLAP` takes the one it overlaps most. The
-    first step matters here: beyond 3.8 m no prior of paper A reaches that overlap with an adult. Unlike in SSD, a prior
-    between `NEAR_OVERLAP` and that is ignored: those were nearly all of the hardest negatives, and taught little else.
+    first step matters here: beyond 3.8 m no prior of paper A reaches that overlap with an adult. Unlike in SSD, a
+    person has `OWN_PRIORS` of its own where they are near enough, and a prior that overlaps one nearly enough
+    (`NEAR_OVERLAP`, `NEAR_SHARE`) is ignored: those were nearly all of the hardest negatives, and taught little else.
 
     Args:
         boxes: (N, 4) people, corners.
@@ -153,12 +158,17 @@ def match(boxes: np.ndarray, difficult: np.ndarray, priors: np.ndarray) -> Targe
     owner = overlaps.argmax(axis=0)
     best = overlaps.max(axis=0)
     owned = best >= MATCH_OVERLAP
-    labels[best >= NEAR_OVERLAP] = IGNORED
+    near = np.minimum(NEAR_OVERLAP, NEAR_SHARE * overlaps.max(axis=1))[owner]
+    labels[(best >= near) & (best > 0.0)] = IGNORED
     overlaps = np.where(difficult[:, None], -1.0, overlaps)  # these need no prior of their own
+    left = overlaps.copy()
     for _ in range(int((~difficult).sum())):
-        person, prior = divmod(int(overlaps.argmax()), len(priors))
+        person, prior = divmod(int(left.argmax()), len(priors))
         owner[prior], owned[prior] = person, True
-        overlaps[person], overlaps[:, prior] = -1.0, -1.0
+        left[person], left[:, prior] = -1.0, -1.0
+    mine = np.where(owner == np.arange(len(boxes))[:, None], overlaps, -1.0)
+    own = np.argsort(-mine, axis=1, kind="stable")[:, :OWN_PRIORS]
+    owned[own[np.take_along_axis(mine, own, axis=1) >= OWN_OVERLAP]] = True
     labels[owned] = np.where(difficult[owner[owned]], IGNORED, POSITIVE)
     found = labels == POSITIVE
     offsets[found] = encode(boxes[owner[found]], priors[found])

@@ -10,7 +10,10 @@ from tracker.detection.priors import (
     IGNORED,
     MATCH_OVERLAP,
     NEAR_OVERLAP,
+    NEAR_SHARE,
     NEGATIVE,
+    OWN_OVERLAP,
+    OWN_PRIORS,
     PAPER_LAYERS,
     POSITIVE,
     SSD300_LAYERS,
@@ -89,7 +92,7 @@ def matched_by_search(boxes: np.ndarray, difficult: np.ndarray) -> np.ndarray:
         best = max(range(len(boxes)), key=lambda n: (overlaps[n, p], -n))
         if overlaps[best, p] >= MATCH_OVERLAP:
             owner[p] = best
-        elif overlaps[best, p] >= NEAR_OVERLAP:
+        elif overlaps[best, p] >= min(NEAR_OVERLAP, NEAR_SHARE * max(overlaps[best, q] for q in range(len(PRIORS)))):
             owner[p] = NEARLY
     left_people, left_priors = [n for n in range(len(boxes)) if not difficult[n]], set(range(len(PRIORS)))
     while left_people:
@@ -97,6 +100,13 @@ def matched_by_search(boxes: np.ndarray, difficult: np.ndarray) -> np.ndarray:
         owner[p] = n
         left_people.remove(n)
         left_priors.remove(p)
+    own = dict(enumerate(owner.tolist()))
+    for p in range(len(PRIORS)):
+        if owner[p] < 0:
+            own[p] = max(range(len(boxes)), key=lambda n: (overlaps[n, p], -n))
+    for n in (n for n in range(len(boxes)) if not difficult[n]):
+        mine = sorted((p for p in own if own[p] == n), key=lambda p: (-overlaps[n, p], p))
+        owner[[p for p in mine[:OWN_PRIORS] if overlaps[n, p] >= OWN_OVERLAP]] = n
     return owner
 
 
@@ -119,11 +129,13 @@ def test_matching_equals_a_search_over_all_pairs() -> None:
     assert not weights[~found].any()
 
 
-def test_a_distant_person_has_a_prior_although_none_overlaps_enough() -> None:
-    box = np.array([[0.48, 0.40, 0.52, 0.65]])  # an adult 4.5 m away
-    assert iou(box, to_corners(PRIORS)).max() < MATCH_OVERLAP
-    labels = match(box, np.array([False]), PRIORS).labels
-    assert (labels == POSITIVE).sum() == 1
+def test_a_distant_person_has_priors_although_none_overlaps_enough() -> None:
+    distant, tiny = np.array([[0.48, 0.40, 0.54, 0.70]]), np.array([[0.48, 0.40, 0.49, 0.44]])  # 4 m away; a hand
+    assert iou(distant, to_corners(PRIORS)).max() < MATCH_OVERLAP
+    assert iou(tiny, to_corners(PRIORS)).max() < OWN_OVERLAP
+    for box, found in ((distant, OWN_PRIORS), (tiny, 1)):
+        labels = match(box, np.array([False]), PRIORS).labels
+        assert (labels == POSITIVE).sum() == found
 
 
 def test_a_picture_without_people_is_all_background() -> None:

@@ -14,7 +14,7 @@ def add(commands: Commands) -> None:
     detector = commands.add_parser("detector", help="train the person detector, evaluate it, look at its pictures")
     actions = detector.add_subparsers(metavar="ACTION", required=True)
     train = actions.add_parser("train", help="train on pictures made from a seed, and keep the run in a folder")
-    train.add_argument("--steps", type=positive, default=10_000, metavar="N", help="batches (default: %(default)s)")
+    train.add_argument("--steps", type=positive, default=16_000, metavar="N", help="batches (default: %(default)s)")
     add_seed(train)
     train.add_argument("--start", type=Path, metavar="FILE", help="weights to start from instead of random ones")
     train.add_argument(

@@ -10,6 +10,7 @@ import dataclasses
 import hashlib
 import json
 import math
+import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -55,7 +56,7 @@ class TrainConfig:
     """
 
     net: str = "light"
-    steps: int = 10_000
+    steps: int = 16_000
     batch: int = 16
     rate: float = 1.5e-3
     warmup: float = 0.06
@@ -132,11 +133,23 @@ def write_card(out: Path) -> None:
         "pictures": int(last["step"]) * settings["batch"],
         "training_s": float(last["seconds"]),
         "torch": torch.__version__,
+        "precision": precision(device()),
         "held_out": {key: float(last[key]) if key == "ap" else int(last[key]) for key in ("pictures", "ap", *COUNTED)},
         "settings": settings,
         "started_from": before,
     }
     (out / "card.json").write_text(json.dumps(card_of_run, indent=1) + "\n", encoding="utf-8")
+
+
+def device() -> torch.device:
+    """Return where training happens."""
+    return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+
+
+def precision(device: torch.device) -> str:
+    """Return in which numbers a device convolves while training: bfloat16 where it has units for their products."""
+    halves = device.type == "cuda" or torch.cpu.get_capabilities().get("amx_bf16", False)
+    return "bfloat16" if halves else "float32"
 
 
 def _digest(file: Path) -> str:
@@ -148,7 +161,9 @@ class _Run:
 
     def __init__(self, config: TrainConfig, out: Path, workers: int, tell: Callable[[str], None]) -> None:
         self.config, self.out, self.workers, self.tell = config, out, workers, tell
-        self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        torch.set_num_threads(max(1, (os.cpu_count() or 1) - 1))  # on a core shared with a worker one holds up all
+        self.device = device()
+        self.precision = precision(self.device)
         torch.manual_seed(config.seed)
         fresh = make_network(config.net) if config.start is None else load_network(config.net, Path(config.start))
         self.network = fresh.train().to(self.device)
@@ -196,7 +211,7 @@ class _Run:
         for group in self.optimiser.param_groups:
             group["lr"] = self._rate(self.step)
         inputs = to_tensor(pictures.to(self.device, non_blocking=True))
-        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.device.type == "cuda"):
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.precision == "bfloat16"):
             logits, coded = self.network(inputs)
         loss = multibox_loss(logits.float(), coded.float(), *(part.to(self.device) for part in targets))
         if not torch.isfinite(loss.total):

@@ -12,12 +12,16 @@ from dataclasses import dataclass
 
 from tracker.metrics import area
 from tracker.person_filter import Vector
-from tracker.sampling import Box
+from tracker.sampling import LEAST_PART, Box
 
 GATE = 0.30
 """R_thre of eq. (15), m."""
 ALPHAS = (1.0, 1.0, 0.8)
 """alpha_0 (shift), alpha_1 (shape) and alpha_2 (aspect ratio within shape) of eq. (16)."""
+PLAUSIBLE = 16.27
+"""Largest squared distance from the prediction over its variance: chi-squared, three degrees of freedom, 99.9 %."""
+SHARED = 0.5
+"""So much of the smaller of two people's boxes may be common to both."""
 COVERED = 0.75
 """So much of a box must two others cover for it to show nobody but them."""
 
@@ -73,15 +77,16 @@ def associate(
         size: Width and height of the picture, px.
         gate: Largest distance from the prediction, m, itself included.
         variance: Of a measured place around the prediction in each direction, m²: inside the gate the likelihood of the
-            place is then Gaussian instead of eq. (15). None is the print.
+            place is then Gaussian instead of eq. (15), and one that is not `PLAUSIBLE` is outside. None is the print.
     """
     if not candidates:
         return Association(None, None, None)
     ranked = [(math.dist(candidate.position, prediction), candidate) for candidate in candidates]
+    reach = gate if variance is None else min(gate, math.sqrt(PLAUSIBLE * variance))
     inside = [
         (log_similarity(candidate.box, tracked, size), distance, candidate)
         for distance, candidate in ranked
-        if distance <= gate
+        if distance <= reach
     ]
     if not inside:
         return Association(None, min(distance for distance, _ in ranked), None)
@@ -102,6 +107,25 @@ def between(box: Box, others: Sequence[Box]) -> bool:
     left = [other for other in others if other[0] < box[0] and other[2] < box[2]]
     right = [other for other in others if other[0] > box[0] and other[2] > box[2]]
     return any(_covered(box, one, other) >= COVERED for one in left for other in right)
+
+
+def alone(box: Box, others: Sequence[Box]) -> Box:
+    """Return the part of a box between those of the people on its left and on its right, or the box if that is little.
+
+    A detection that shares half of itself with this one, or half of this one, shows the same person.
+
+    Args:
+        box: Of a detection, px.
+        others: Of the other detections.
+    """
+    u0, v0, u1, v1 = box
+    for other in others:
+        if area(_common(box, other)) < SHARED * min(area(box), area(other)):
+            if other[0] < box[0] and other[2] < box[2]:
+                u0 = max(u0, other[2])
+            elif other[0] > box[0] and other[2] > box[2]:
+                u1 = min(u1, other[0])
+    return (u0, v0, u1, v1) if u1 - u0 >= LEAST_PART * (box[2] - box[0]) else box
 
 
 def log_similarity(box: Box, tracked: Box, size: tuple[int, int], alphas: tuple[float, float, float] = ALPHAS) -> float:

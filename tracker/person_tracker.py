@@ -15,7 +15,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.association import GATE, Association, Candidate, associate, between
+from tracker.association import GATE, Association, Candidate, alone, associate, between
 from tracker.detection.boxes import Detection
 from tracker.geometry import CAMERA_FRAME, CameraMount, Intrinsics, back_project
 from tracker.metrics import area, overlap
@@ -313,13 +313,12 @@ class PersonTracker:
     def _candidates(self, rgb: NDArray[np.uint8], depth: NDArray[np.float32]) -> list[Candidate]:
         """Return the detections that have a depth, with their boxes clipped to the picture."""
         detections = self._detector.detect(rgb, depth)
+        boxes = [detection.box for detection in detections]
         if self._settings.company == "apart":
             self._in_company |= len(detections) > 1
-            boxes = [detection.box for detection in detections]
-            detections = [d for k, d in enumerate(detections) if not between(d.box, boxes[:k] + boxes[k + 1 :])]
         found = []
-        for detection in detections:
-            seen = self._seen(depth, detection.box)
+        for k, detection in enumerate(detections):
+            seen = self._seen(depth, detection.box, boxes[:k] + boxes[k + 1 :])
             if seen is not None:
                 box, z = seen
                 right, down, forward = back_project(
@@ -328,11 +327,13 @@ class PersonTracker:
                 found.append(Candidate(box, detection.score, (forward, -right, -down)))
         return found
 
-    def _seen(self, depth: NDArray[np.float32], box: Box) -> tuple[Box, float] | None:
+    def _seen(self, depth: NDArray[np.float32], box: Box, others: Sequence[Box]) -> tuple[Box, float] | None:
         """Return what a box shows of the person, inside the picture, and at which depth."""
         expected = self._filter.position if self._filter is not None else self._samples[-1] if self._samples else None
+        if self._in_company and between(box, others):
+            return None
         if self._in_company and expected is not None:
-            return seen_at(depth, box, expected[0] - self._mount.forward, self._settings.gate)
+            return seen_at(depth, box, expected[0] - self._mount.forward, self._settings.gate, alone(box, others))
         z = box_depth(depth, box)
         if z is None:
             return None

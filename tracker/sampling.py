@@ -75,6 +75,7 @@ def seen_at(
     box: Box,
     expected: float,
     reach: float,
+    alone: Box | None = None,
     valid_range: tuple[float, float] = VALID_RANGE,
 ) -> tuple[Box, float] | None:
     """Return the part of a box that shows a person at an expected depth, and its depth m; None if it shows another.
@@ -90,6 +91,7 @@ def seen_at(
         box: As in `box_depth`.
         expected: Depth at which the person should be, m.
         reach: So much nearer or farther a sample may be, m.
+        alone: The part of the box where nobody else was detected; samples are taken there, None taking them anywhere.
         valid_range: As in `box_depth`.
     """
     visible = _clipped(box, depth.shape[1], depth.shape[0])
@@ -106,7 +108,10 @@ def seen_at(
     part = max(u0, left + float(columns[0])), v0, min(u1, left + float(columns[-1]) + 1.0), v1
     if part[2] - part[0] < LEAST_PART * (u1 - u0):
         return None
-    samples, whole = _valid_sorted(_grid(depth, part), nearest, farthest), _grid(depth, visible)
+    inner = part if alone is None else (max(part[0], alone[0]), part[1], min(part[2], alone[2]), part[3])
+    if inner[2] - inner[0] < LEAST_PART * (part[2] - part[0]):
+        inner = part
+    samples, whole = _valid_sorted(_grid(depth, inner), nearest, farthest), _grid(depth, visible)
     before = np.count_nonzero((whole >= valid_range[0]) & (whole < nearest))
     if samples is None or before > np.count_nonzero((whole >= nearest) & (whole <= farthest)):
         return None

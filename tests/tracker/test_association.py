@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
-from tracker.association import COVERED, Candidate, associate, between, log_similarity
+from tracker.association import COVERED, Candidate, alone, associate, between, log_similarity
 
 SIZE = (320, 240)
 BOX = (100.0, 60.0, 160.0, 220.0)
@@ -88,7 +89,7 @@ def test_random_candidates_against_brute_force():
 
 def test_with_a_variance_the_place_counts_by_its_gaussian_likelihood():
     rng = np.random.default_rng(3)
-    differ = 0
+    differ = implausible = 0
     for _ in range(300):
         prediction = rng.normal(0, 1, 3)
         candidates = []
@@ -99,16 +100,22 @@ def test_with_a_variance_the_place_counts_by_its_gaussian_likelihood():
 
         found = associate(candidates, tuple(prediction), BOX, SIZE, variance=0.05**2)
 
-        density = [
-            math.exp(log_similarity(c.box, BOX, SIZE))
-            * math.prod(math.exp(-(((a - b) / 0.05) ** 2) / 2) for a, b in zip(c.position, prediction, strict=True))
-            for c in candidates
-        ]
+        density = []
+        for c in candidates:
+            shift = np.subtract(c.position, prediction) / 0.05
+            plausible = chi2.sf(shift @ shift, 3) >= 1e-3
+            density.append(math.exp(log_similarity(c.box, BOX, SIZE) - shift @ shift / 2) if plausible else 0.0)
+        if not any(density):
+            assert found.chosen is None
+            assert associate(candidates, tuple(prediction), BOX, SIZE).chosen is not None
+            implausible += 1
+            continue
         best = candidates[int(np.argmax(density))]
         assert found.chosen is best
         assert found.log_score == pytest.approx(log_similarity(best.box, BOX, SIZE))
         differ += best is not associate(candidates, tuple(prediction), BOX, SIZE).chosen
     assert differ > 50
+    assert implausible > 1
 
 
 def test_a_box_between_two_others_is_the_one_that_both_cover():
@@ -121,6 +128,17 @@ def test_a_box_between_two_others_is_the_one_that_both_cover():
     assert not between(bridge, [left])
     assert not between(bridge, [left, (200.0, 40.0, 260.0, 200.0)])
     assert not between(bridge, [])
+
+
+def test_a_box_is_alone_between_its_neighbours():
+    box, left, right = (50.0, 40.0, 110.0, 200.0), (0.0, 30.0, 62.0, 210.0), (100.0, 45.0, 160.0, 205.0)
+
+    assert alone(box, []) == box
+    assert alone(box, [left, right]) == (62.0, 40.0, 100.0, 200.0)
+    assert alone(box, [(0.0, 30.0, 40.0, 210.0)]) == box  # too far away to share anything
+    assert alone(box, [(52.0, 60.0, 70.0, 150.0)]) == box  # a part of the same person
+    assert alone(box, [(30.0, 40.0, 95.0, 200.0)]) == box  # nearly the same box
+    assert alone(box, [left, (76.0, 40.0, 160.0, 70.0)]) == box  # little would be left
 
 
 def test_how_much_two_boxes_cover_is_what_counting_pixels_says():

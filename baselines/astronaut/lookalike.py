@@ -3,9 +3,10 @@
 `script` says what happens in an episode: a close pass (Figure 17), then an occlusion (Figure 18).
 
 **Right and wrong.** In a frame with an accepted measurement the tracker is wrong if the measured place on the floor is
-nearer to the other person's body than to the target's, and at nobody's if it is far from both. Boxes would not tell:
-when the other one stands behind the target, both true boxes lie in the same place of the picture. A switch is a wrong
-frame after a right one.
+nearer to the other person's body than to the target's, and at nobody's if it is far from both. A body is all of it: one
+that bends forward is measured at its head, half a metre before its middle. Boxes would not tell: when the other one
+stands behind the target, both true boxes lie in the same place of the picture. A switch is a wrong frame after a right
+one.
 
 **Hidden.** The target is visible while at least half of its pixels are; the occlusion starts with the first processed
 frame from which it stays hidden for longer than a second. A stop while it is visible is a false one; if the target is
@@ -18,7 +19,6 @@ that depth inside the gate, and so adopts the other person. Ours reports boxes w
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
@@ -46,8 +46,8 @@ HALF = 0.5
 """Least share of the target's pixels that must be visible; with less it is hidden."""
 HIDDEN_TIME = SETTINGS.stop_time
 """For longer than this the target must stay hidden for an occlusion, s."""
-NEAR = 0.75
-"""A measured place farther than this from everybody's middle is nobody's, m."""
+NEAR = 0.30
+"""A measured place farther than this from everybody's body is nobody's, m."""
 WHOLE = 0.75
 """Least visible share of the target at which it is named again after a false stop."""
 
@@ -105,7 +105,7 @@ class Frame:
             return None
         x, y, _ = track.measurement
         place = CAMERA.x + x, CAMERA.y + y
-        away = {person.id: math.dist(place, person.vertices[:, :2].mean(axis=0)) for person in self.people}
+        away = {one.id: float(np.linalg.norm(one.vertices[:, :2] - place, axis=1).min()) for one in self.people}
         nearest = min(away, key=lambda id: away[id])
         return "nobody" if away[nearest] > NEAR else "target" if nearest == TARGET else "other"
 

@@ -1,19 +1,22 @@
 """Paper A's second experiment with perfect boxes: no switch, a stop a second after the target is hidden."""
 
-import dataclasses
 import math
-from collections import deque
+from collections import Counter, deque
 from itertools import islice
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from baselines.astronaut.experiments import Part, Player, Rows
-from baselines.astronaut.lookalike import COLUMNS, HALF, film, play, table
+from baselines.astronaut.lookalike import COLUMNS, HALF, NEAR, Frame, film, play, table
 from baselines.astronaut.script import OTHER, TARGET, Cast, draw_script
 from baselines.astronaut.stage import CAMERA, Stage, stage
 from tracker.detection.boxes import Detection
 
 SEEDS = (2, 15)
+NAMES = {TARGET: "target", OTHER: "other"}
 
 
 @pytest.fixture(scope="module")
@@ -39,18 +42,23 @@ def test_it_stops_about_a_second_after_the_target_is_hidden(rows):
         assert 0.5 <= row["stop_time"] <= 1.3
 
 
-def test_whose_place_was_measured_is_told_by_the_bodies():
-    """At each one's own middle, just nearer to one, and out of reach of both."""
-    frame = next(frame for frame in film(SEEDS[0]) if len(frame.people) == 2)
-    middles = [person.vertices.mean(axis=0) - (CAMERA.x, CAMERA.y, 0.0) for person in frame.people]
+def whose(people, place):
+    """What a frame says of a place (x, y) in the room."""
+    measured = (place[0] - CAMERA.x, place[1] - CAMERA.y, 0.0)
+    return Frame(0.0, people, None, [], None, None).followed(SimpleNamespace(measurement=measured))
 
-    def at(place):
-        return frame.followed(dataclasses.replace(frame.track, measurement=tuple(map(float, place))))
 
-    assert [at(middle) for middle in middles] == ["target", "other"]
-    assert at(middles[0] + 0.6 * (middles[1] - middles[0]) / math.dist(*middles)) == "target"
-    assert at(middles[0] + (0.0, 9.0, 0.0)) == "nobody"
-    assert frame.followed(dataclasses.replace(frame.track, measurement=None)) is None
+def test_whose_place_was_measured_is_told_by_the_nearest_body():
+    people = next(frame.people for frame in film(SEEDS[0]) if len(frame.people) == 2)
+    trees = {NAMES[one.id]: KDTree(one.vertices[:, :2]) for one in people}
+    told = Counter()
+    for place in np.random.default_rng(0).uniform((-3.5, -1.5), (1.0, 1.5), (500, 2)):
+        away = {name: tree.query(place)[0] for name, tree in trees.items()}
+        nearest = min(away, key=away.get)
+        assert whose(people, place) == (nearest if away[nearest] <= NEAR else "nobody")
+        told[whose(people, place)] += 1
+    assert min(told["target"], told["other"], told["nobody"]) > 10
+    assert Frame(0.0, people, None, [], None, None).followed(SimpleNamespace(measurement=None)) is None
 
 
 def test_the_printed_tracker_follows_who_steps_in(rows):

@@ -120,7 +120,7 @@ def alone(box: Box, others: Sequence[Box]) -> Box:
     """
     u0, v0, u1, v1 = box
     for other in others:
-        if area(_common(box, other)) < SHARED * min(area(box), area(other)):
+        if 0.0 < area(_common(box, other)) < SHARED * min(area(box), area(other)):
             if other[0] < box[0] and other[2] < box[2]:
                 u0 = max(u0, other[2])
             elif other[0] > box[0] and other[2] > box[2]:

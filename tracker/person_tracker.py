@@ -59,7 +59,8 @@ class TrackerSettings:
         stop_time: After so long without the person the tracker stops, s; at least one frame.
         gate: Largest distance between a measurement and its prediction, m, eq. (15).
         company: What is done once others have been detected: `apart` reads a box only where it is at the predicted
-            depth (`seen_at`), leaves out boxes between two people (`between`) and weighs places by their likelihood
+            depth (`seen_at`) and nobody else was detected (`alone`), leaves out boxes between two people (`between`),
+            weighs places by their likelihood and takes none that is not plausible, be it inside the gate
             (`associate`); `printed` goes on as with one person. As printed the tracker drifts to whoever steps before
             its target. With one person there is no difference.
         frame: In which frame the person's velocity is taken to be constant: `odom`, the ground, or `body`, the robot,

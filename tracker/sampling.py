@@ -27,7 +27,7 @@ FEWEST_SAMPLES = 3
 EDGE_SHARE = 0.10
 """Of a column's pixels in the middle 80 % of a box's height at least so many must be at a person's depth."""
 LEAST_PART = 0.5
-"""So much of a box's width must be left of it; of less it is somebody else's box."""
+"""So much of a box's width must be left where it is cut: what is less shows somebody else, or too little."""
 
 
 def box_depth(
@@ -91,7 +91,8 @@ def seen_at(
         box: As in `box_depth`.
         expected: Depth at which the person should be, m.
         reach: So much nearer or farther a sample may be, m.
-        alone: The part of the box where nobody else was detected; samples are taken there, None taking them anywhere.
+        alone: The part of the box where nobody else was detected: samples are taken there if enough of what the box
+            shows of the person lies in it. None takes them anywhere.
         valid_range: As in `box_depth`.
     """
     visible = _clipped(box, depth.shape[1], depth.shape[0])
@@ -108,10 +109,14 @@ def seen_at(
     part = max(u0, left + float(columns[0])), v0, min(u1, left + float(columns[-1]) + 1.0), v1
     if part[2] - part[0] < LEAST_PART * (u1 - u0):
         return None
-    inner = part if alone is None else (max(part[0], alone[0]), part[1], min(part[2], alone[2]), part[3])
-    if inner[2] - inner[0] < LEAST_PART * (part[2] - part[0]):
-        inner = part
-    samples, whole = _valid_sorted(_grid(depth, inner), nearest, farthest), _grid(depth, visible)
+    samples = None
+    if alone is not None:
+        inner = max(part[0], alone[0]), part[1], min(part[2], alone[2]), part[3]
+        if inner[2] - inner[0] >= LEAST_PART * (part[2] - part[0]):
+            samples = _valid_sorted(_grid(depth, inner), nearest, farthest)
+    if samples is None:
+        samples = _valid_sorted(_grid(depth, part), nearest, farthest)
+    whole = _grid(depth, visible)
     before = np.count_nonzero((whole >= valid_range[0]) & (whole < nearest))
     if samples is None or before > np.count_nonzero((whole >= nearest) & (whole <= farthest)):
         return None

@@ -69,7 +69,7 @@ COLUMNS = (
 )
 """Of a row. `distance` of the target, `gap` between the two when close and `step_in`, how far before the target the
 other one stays, m; frames are processed ones; `switches_hidden` of the switches began when the target was hidden;
-`gate_rejections` are frames with measured detections, none of them inside the gate; `least_visible` is the smallest
+`gate_rejections` are frames with measured detections, all of them rejected; `least_visible` is the smallest
 visible share before the other one steps in; times in s, empty if there is none; `stop_time` counts from the occlusion's
 start; `seconds_visible` from the first confirmation on. `printed_...` are those of the paper's tracker to the
 letter, which takes its depth samples from the box whosoever they are."""

@@ -118,6 +118,12 @@ def test_with_a_variance_the_place_counts_by_its_gaussian_likelihood():
     assert implausible > 1
 
 
+def test_a_large_variance_does_not_widen_the_gate():
+    for away, taken in ((0.29, True), (0.31, False)):
+        found = associate([at((away, 0.0, 0.0))], (0.0, 0.0, 0.0), BOX, SIZE, variance=1.0)
+        assert (found.chosen is not None) == taken
+
+
 def test_a_box_between_two_others_is_the_one_that_both_cover():
     left, right = (20.0, 40.0, 80.0, 200.0), (85.0, 50.0, 150.0, 200.0)
     bridge = (50.0, 45.0, 120.0, 200.0)
@@ -135,9 +141,10 @@ def test_a_box_is_alone_between_its_neighbours():
 
     assert alone(box, []) == box
     assert alone(box, [left, right]) == (62.0, 40.0, 100.0, 200.0)
-    assert alone(box, [(0.0, 30.0, 40.0, 210.0)]) == box  # too far away to share anything
-    assert alone(box, [(52.0, 60.0, 70.0, 150.0)]) == box  # a part of the same person
-    assert alone(box, [(30.0, 40.0, 95.0, 200.0)]) == box  # nearly the same box
+    assert alone(box, [(0.0, 30.0, 40.0, 210.0)]) == box  # beside it
+    assert alone(box, [(20.0, 0.0, 75.0, 35.0)]) == box  # above it
+    assert alone(box, [(45.0, 60.0, 65.0, 150.0)]) == box  # three quarters of it: a part of the same person
+    assert alone(box, [(30.0, 60.0, 65.0, 150.0)]) == (65.0, 40.0, 110.0, 200.0)  # three sevenths
     assert alone(box, [left, (76.0, 40.0, 160.0, 70.0)]) == box  # little would be left
 
 

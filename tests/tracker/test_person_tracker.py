@@ -250,6 +250,34 @@ def test_a_third_box_between_two_people_is_nobody(seed):
     assert track.state == "tracking"
 
 
+def test_in_company_a_place_that_is_not_plausible_is_not_taken_though_inside_the_gate():
+    """A quarter of a metre to the other's side in one frame; alone, and as printed, it is taken."""
+    taken = {}
+    for company, others in (("apart", [(2.4, 0.9)]), ("printed", [(2.4, 0.9)]), ("apart", [])):
+        show = Show(dataclasses.replace(TEN_HZ, company=company))
+        show.confirmed((2.4, 0.0), *others, frames=30)
+        track = show((2.4, 0.25), *others)
+        assert track.gate_distance < GATE
+        taken[company, len(others)] = track.measurement is not None
+    assert taken == {("apart", 1): False, ("printed", 1): True, ("apart", 0): True}
+
+
+def test_a_neighbours_arm_before_the_person_does_not_move_it():
+    """Both are detected; the arm is 0.2 m nearer and lies under a column of the samples."""
+    moved_by = {}
+    for company in ("apart", "printed"):
+        show = Show(dataclasses.replace(TEN_HZ, company=company))
+        before = show.confirmed((2.4, 0.0), (2.4, 0.6), frames=30).position
+        rgb, depth, (mine, other) = picture((2.4, 0.0), (2.4, 0.6))
+        u0, v0, u1, v1 = mine.box
+        arm = math.ceil(u0 + 0.25 * (u1 - u0))
+        depth[int(v0) : int(v1), int(u0) : arm] -= 0.2
+        show.detector.next = [mine, Detection((*other.box[:2], float(arm), other.box[3]), 0.9)]
+        moved_by[company] = before[0] - show.tracker.update(rgb, depth).measurement[0]
+    assert moved_by["apart"] == pytest.approx(0.0, abs=0.01)
+    assert moved_by["printed"] > 0.1
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_with_one_person_company_makes_no_difference(seed):
     tracks = []

@@ -232,6 +232,15 @@ def test_an_arm_before_the_box_lends_no_depth_where_its_owner_was_detected(right
     assert (part, z) == (box, pytest.approx(2.2))
 
 
+@pytest.mark.parametrize("width", [26, 20])
+def test_where_the_person_shows_only_where_another_was_detected_all_of_the_box_is_read(width):
+    """Without depth, or too little, in the part where nobody else was detected."""
+    depth, _ = show(((60, 20, 60 + width, 110), 2.2), ((110 - width, 54, 110, 63), 2.2))
+    box = (60.0, 20.0, 110.0, 110.0)
+
+    assert seen_at(depth, box, 2.2, 0.3, (84.0, 20.0, 110.0, 110.0)) == seen_at(depth, box, 2.2, 0.3) is not None
+
+
 def test_measurement_finds_a_person_where_it_stands():
     """A flat target 0.3 m left of and 2.1 m ahead of the axle, seen by a camera 0.1 m ahead of it."""
     intrinsics = XTION_PRO.scaled(320, 240)

@@ -24,7 +24,7 @@ def multibox_loss(
     """Return softmax cross-entropy over positives and the hardest negatives plus smooth L1 over positives.
 
     Two things differ from SSD. A person counts by the root of the number of priors that have to find it, not by that
-    number: it is some 60 for one who fills the picture and 1 for one 4 m away, who would be learned last. And the
+    number: it is some 60 for one who fills the picture and 3 for one 4 m away, who would be learned last. And the
     hardest negatives, `NEGATIVES_PER_POSITIVE` for each positive in number and in weight, are those of the whole batch,
     not of each picture: pictures without anybody have no positives, and would teach nothing. A batch without anybody
     counts as one with one positive prior.

@@ -18,11 +18,11 @@ VARIANCES = (0.1, 0.2)
 MATCH_OVERLAP = 0.5
 """Least overlap at which a prior has to find a person (paper A, figure 8; SSD)."""
 NEAR_OVERLAP, NEAR_SHARE = 0.4, 0.8
-"""Least overlap at which a prior may find a person, and least share of the greatest that a prior has with that person:
-what it says then is suppressed by the better ones anyway."""
+"""A prior may find the person that it overlaps most from this overlap on, or from this share of the greatest overlap
+that any has with that person, if that is less: what it says then is suppressed by the better ones anyway."""
 OWN_PRIORS, OWN_OVERLAP = 3, 0.2
-"""So many of the priors that overlap a person most have to find it, if they overlap it by this at least (Zhang et al.,
-S3FD, 2017): somebody thin or far away would be learned by a single one."""
+"""So many of the priors that overlap nobody more have to find a person, if they overlap it by this at least (Zhang et
+al., S3FD, 2017): somebody thin or far away would be learned by a single one."""
 POSITIVE, NEGATIVE, IGNORED = 1, 0, -1
 """Labels of priors: person, background, neither (it overlaps a person a little too little, or one too hard to see)."""
 

@@ -85,7 +85,7 @@ class TrainConfig:
 def train(
     config: TrainConfig, out: Path, workers: int = 1, resume: bool = False, tell: Callable[[str], None] = print
 ) -> Score:
-    """Train a network and return its score on held-out pictures.
+    """Train a network and return its score on held-out pictures; torch takes all cores but one, in the whole process.
 
     Args:
         config: the run.
@@ -105,12 +105,13 @@ def train(
         raise ValueError(f"{out} holds a run of other settings; repeat those of {record}, or name another folder")
     out.mkdir(parents=True, exist_ok=True)
     record.write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
-    score = _Run(config, out, workers, tell).go()
-    write_card(out)
+    run = _Run(config, out, workers, tell)
+    score = run.go()
+    _write_card(out, run.precision)
     return score
 
 
-def write_card(out: Path) -> None:
+def _write_card(out: Path, precision: str) -> None:
     """Write `card.json` beside the weights of a run: what they are and how they came about.
 
     Weights that the run started from are named by their SHA-256; if a card lies beside them, it becomes part of this.
@@ -133,7 +134,7 @@ def write_card(out: Path) -> None:
         "pictures": int(last["step"]) * settings["batch"],
         "training_s": float(last["seconds"]),
         "torch": torch.__version__,
-        "precision": precision(device()),
+        "precision": precision,
         "held_out": {key: float(last[key]) if key == "ap" else int(last[key]) for key in ("pictures", "ap", *COUNTED)},
         "settings": settings,
         "started_from": before,
@@ -141,13 +142,8 @@ def write_card(out: Path) -> None:
     (out / "card.json").write_text(json.dumps(card_of_run, indent=1) + "\n", encoding="utf-8")
 
 
-def device() -> torch.device:
-    """Return where training happens."""
-    return torch.device("cuda" if torch.cuda.is_available() else "cpu")
-
-
-def precision(device: torch.device) -> str:
-    """Return in which numbers a device convolves while training: bfloat16 where it has units for their products."""
+def choose_precision(device: torch.device) -> str:
+    """Return in which numbers a device convolves while training: bfloat16 on GPUs and on CPUs with AMX."""
     halves = device.type == "cuda" or torch.cpu.get_capabilities().get("amx_bf16", False)
     return "bfloat16" if halves else "float32"
 
@@ -162,8 +158,8 @@ class _Run:
     def __init__(self, config: TrainConfig, out: Path, workers: int, tell: Callable[[str], None]) -> None:
         self.config, self.out, self.workers, self.tell = config, out, workers, tell
         torch.set_num_threads(max(1, (os.cpu_count() or 1) - 1))  # on a core shared with a worker one holds up all
-        self.device = device()
-        self.precision = precision(self.device)
+        self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        self.precision = choose_precision(self.device)
         torch.manual_seed(config.seed)
         fresh = make_network(config.net) if config.start is None else load_network(config.net, Path(config.start))
         self.network = fresh.train().to(self.device)
@@ -243,6 +239,7 @@ class _Run:
         state = {
             "step": self.step,
             "seconds": self.seconds,
+            "precision": self.precision,
             "network": self.network.state_dict(),
             "averaged": self.averaged.state_dict(),
             "optimiser": self.optimiser.state_dict(),
@@ -258,7 +255,7 @@ class _Run:
         return result
 
     def _restore(self, state: dict) -> None:
-        self.step, self.seconds = state["step"], state["seconds"]
+        self.step, self.seconds, self.precision = state["step"], state["seconds"], state["precision"]
         self.network.load_state_dict(state["network"])
         self.averaged.load_state_dict(state["averaged"])
         self.optimiser.load_state_dict(state["optimiser"])

@@ -138,6 +138,17 @@ def test_a_distant_person_has_priors_although_none_overlaps_enough() -> None:
         assert (labels == POSITIVE).sum() == found
 
 
+def test_priors_as_good_as_those_that_have_to_find_a_person_may() -> None:
+    distant = np.array([[0.48, 0.40, 0.54, 0.70]])
+    overlaps = iou(distant, to_corners(PRIORS))[0]
+    labels = match(distant, np.array([False]), PRIORS).labels
+    good = overlaps >= NEAR_SHARE * overlaps.max()
+    np.testing.assert_array_equal(labels == IGNORED, good & (labels != POSITIVE))
+    assert overlaps.max() < NEAR_OVERLAP / NEAR_SHARE
+    assert (labels == IGNORED).any()
+    assert (match(distant, np.array([True]), PRIORS).labels != POSITIVE).all()
+
+
 def test_a_picture_without_people_is_all_background() -> None:
     labels, offsets, weights = match(np.zeros((0, 4)), np.zeros(0, bool), PRIORS)
     assert (labels == NEGATIVE).all()

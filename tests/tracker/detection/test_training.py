@@ -2,6 +2,7 @@
 
 import csv
 import dataclasses
+import json
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,21 @@ def test_an_interrupted_run_goes_on_to_the_same_weights(finished: Path, tmp_path
     train(SHORT, tmp_path / "run", workers=1, resume=True, tell=quiet)
     for name in ("log.csv", "weights.safetensors"):
         assert (tmp_path / "run" / name).read_bytes() == (finished / name).read_bytes()
+
+
+def test_a_run_goes_on_in_the_numbers_it_began_with(
+    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another machine may have other units; the card tells what the weights were trained in."""
+    here = json.loads((finished / "card.json").read_text(encoding="utf-8"))["precision"]
+    other = {"float32": "bfloat16", "bfloat16": "float32"}[here]
+    monkeypatch.setattr(training, "choose_precision", lambda device: other)
+    train(dataclasses.replace(SHORT, steps=2), tmp_path / "run", workers=0, tell=quiet)
+    monkeypatch.undo()
+    train(dataclasses.replace(SHORT, steps=2), tmp_path / "run", workers=0, resume=True, tell=quiet)
+    assert json.loads((tmp_path / "run" / "card.json").read_text(encoding="utf-8"))["precision"] == other
+    rows = [(folder / "log.csv").read_text(encoding="utf-8").splitlines()[1] for folder in (finished, tmp_path / "run")]
+    assert rows[0] != rows[1]
 
 
 def test_a_finished_run_has_nothing_left_to_do(finished: Path) -> None:

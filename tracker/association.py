@@ -23,7 +23,7 @@ PLAUSIBLE = 16.27
 SHARED = 0.5
 """So much of the smaller of two people's boxes may be common to both."""
 COVERED = 0.75
-"""So much of a box must two others cover for it to show nobody but them."""
+"""So much of a box must two others cover for it to show nobody but them; so much of another, and it is a part of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,11 +82,11 @@ def associate(
     if not candidates:
         return Association(None, None, None)
     ranked = [(math.dist(candidate.position, prediction), candidate) for candidate in candidates]
-    reach = gate if variance is None else min(gate, math.sqrt(PLAUSIBLE * variance))
+    farthest = reach(gate, variance)
     inside = [
         (log_similarity(candidate.box, tracked, size), distance, candidate)
         for distance, candidate in ranked
-        if distance <= reach
+        if distance <= farthest
     ]
     if not inside:
         return Association(None, min(distance for distance, _ in ranked), None)
@@ -95,15 +95,22 @@ def associate(
     return Association(chosen, distance, score)
 
 
+def reach(gate: float, variance: float | None) -> float:
+    """Return how far from its prediction a place may be, m: the gate, or what is `PLAUSIBLE` of this variance, m²."""
+    return gate if variance is None else min(gate, math.sqrt(PLAUSIBLE * variance))
+
+
 def between(box: Box, others: Sequence[Box]) -> bool:
     """Return whether a box shows nobody but two others' people, one on its left and one on its right.
 
-    Of two people close to each other a detector may report a third one, who is half the one and half the other.
+    Of two people close to each other a detector may report a third one, who is half the one and half the other. A box
+    that lies in this one but for a quarter shows a part of the same person, not another one.
 
     Args:
         box: Of a detection, px.
         others: Of the other detections.
     """
+    others = [other for other in others if area(_common(box, other)) < COVERED * area(other)]
     left = [other for other in others if other[0] < box[0] and other[2] < box[2]]
     right = [other for other in others if other[0] > box[0] and other[2] > box[2]]
     return any(_covered(box, one, other) >= COVERED for one in left for other in right)

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from baselines.astronaut.experiments import Part, Player, Rows
-from baselines.astronaut.lookalike import COLUMNS, HALF, NEAR, Frame, film, play, table
+from baselines.astronaut.lookalike import COLUMNS, HALF, NEAR, TOUCH, Frame, film, play, table
 from baselines.astronaut.script import OTHER, TARGET, Cast, draw_script
 from baselines.astronaut.stage import CAMERA, Stage, stage
 from tracker.detection.boxes import Detection
@@ -54,7 +54,7 @@ def test_whose_place_was_measured_is_told_by_the_nearest_body():
     told = Counter()
     for place in np.random.default_rng(0).uniform((-3.5, -1.5), (1.0, 1.5), (500, 2)):
         away = {name: tree.query(place)[0] for name, tree in trees.items()}
-        nearest = min(away, key=away.get)
+        nearest = "target" if away["target"] <= TOUCH else min(away, key=away.get)
         assert whose(people, place) == (nearest if away[nearest] <= NEAR else "nobody")
         told[whose(people, place)] += 1
     assert min(told["target"], told["other"], told["nobody"]) > 10

@@ -134,6 +134,7 @@ def test_a_box_between_two_others_is_the_one_that_both_cover():
     assert not between(bridge, [left])
     assert not between(bridge, [left, (200.0, 40.0, 260.0, 200.0)])
     assert not between(bridge, [])
+    assert not between(bridge, [left, (100.0, 60.0, 125.0, 180.0)])  # but a fifth in it: an arm, not a neighbour
 
 
 def test_a_box_is_alone_between_its_neighbours():
@@ -161,7 +162,10 @@ def test_how_much_two_boxes_cover_is_what_counting_pixels_says():
         covered = float((counts[v[0] : v[1], u[0] : u[1]] > 0).mean())
         order = sorted(others)
         sides = order[0][0] < box[0] and order[0][2] < box[2] and order[1][0] > box[0] and order[1][2] > box[2]
-        assert between(box, others) == (sides and covered >= COVERED)
+        inside = np.zeros((42, 42), bool)
+        inside[v[0] : v[1], u[0] : u[1]] = True
+        parts = [float(inside[rows[0] : rows[1], columns[0] : columns[1]].mean()) for columns, rows in edges[1:]]
+        assert between(box, others) == (sides and covered >= COVERED and max(parts) < COVERED)
         agreed.append(between(box, others))
     assert 10 < sum(agreed) < 1000
 

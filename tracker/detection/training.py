@@ -290,7 +290,7 @@ def draw_curves(out: Path) -> None:
     import matplotlib
 
     matplotlib.use("Agg")
-    from matplotlib import pyplot
+    from matplotlib import pyplot, ticker
 
     losses = np.genfromtxt(out / "log.csv", delimiter=",", names=True, ndmin=1)
     scores = np.genfromtxt(out / "evaluation.csv", delimiter=",", names=True, ndmin=1)
@@ -300,8 +300,13 @@ def draw_curves(out: Path) -> None:
     left.plot(losses["step"], losses["loss"], color="0.8", linewidth=0.5)
     left.plot(losses["step"][span - 1 :], smooth, color="tab:blue")
     left.set(xlabel="step", ylabel="MultiBox loss", yscale="log")
+    left.yaxis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
+    left.yaxis.set_major_formatter("{x:g}")
+    left.yaxis.set_minor_formatter(ticker.NullFormatter())
     right.plot(scores["step"], scores["ap"], marker="o", color="tab:green")
     right.set(xlabel="step", ylabel="AP at overlap 0.5, held-out scenes", ylim=(0.0, 1.0))
+    for axes in (left, right):
+        axes.xaxis.set_major_locator(ticker.MaxNLocator(5, integer=True))
     figure.savefig(out / "curves.png", dpi=110)
     pyplot.close(figure)
 

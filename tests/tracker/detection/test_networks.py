@@ -1,4 +1,4 @@
-"""The networks: what comes out, what they cost, and that the light one learns."""
+"""The networks: what comes out, what they cost, and that they learn."""
 
 import numpy as np
 import pytest
@@ -9,6 +9,7 @@ from tracker.detection.detector import network_input, to_tensor
 from tracker.detection.loss import multibox_loss
 from tracker.detection.networks import NETS, count_macs, count_parameters, make_network
 from tracker.detection.priors import match, prior_boxes
+from tracker.detection.training import choose_precision
 
 
 @pytest.mark.parametrize(("name", "priors"), [("light", 2252), ("light_depth", 2252), ("light_ssd", 8732)])
@@ -54,24 +55,35 @@ def test_every_weight_gets_a_gradient(name: str) -> None:
     assert silent == []
 
 
-def test_the_light_network_learns_eight_pictures_by_heart() -> None:
+@pytest.mark.parametrize(
+    ("name", "steps", "rate", "share"),
+    [
+        ("light", 12, 3e-3, 0.6),
+        ("light_ssd", 12, 3e-3, 0.6),
+        pytest.param("paper", 4, 1e-4, 0.95, marks=pytest.mark.slow),
+        pytest.param("ssd300", 4, 1e-4, 0.95, marks=pytest.mark.slow),
+    ],
+)
+def test_a_network_learns_eight_pictures(name: str, steps: int, rate: float, share: float) -> None:
     torch.manual_seed(0)
     torch.set_num_threads(1)
-    source, priors = SampleSource(5), prior_boxes(NETS["light"].layers)
+    source, priors = SampleSource(5), prior_boxes(NETS[name].layers)
     samples = [source.sample(k) for k in range(8)]
     pictures = torch.stack([torch.from_numpy(network_input(s.rgb, None)) for s in samples])
     matched = [match(s.boxes, s.difficult, priors) for s in samples]
     targets = [torch.from_numpy(np.stack(part)) for part in zip(*matched, strict=True)]
-    network = make_network("light").train().to(memory_format=torch.channels_last)
-    optimiser = torch.optim.AdamW(network.parameters(), lr=3e-3)
+    network = make_network(name).train()
+    optimiser = torch.optim.AdamW(network.parameters(), lr=rate)
     losses = []
-    for _ in range(12):
-        loss = multibox_loss(*network(to_tensor(pictures)), *targets)
+    for _ in range(steps):
+        with torch.autocast("cpu", torch.bfloat16, enabled=choose_precision(torch.device("cpu")) == "bfloat16"):
+            logits, offsets = network(to_tensor(pictures))
+        loss = multibox_loss(logits.float(), offsets.float(), *targets)
         optimiser.zero_grad()
         loss.total.backward()
         optimiser.step()
         losses.append(loss.total.item())
-    assert losses[-1] < 0.6 * losses[0]
+    assert losses[-1] < share * losses[0]
 
 
 def test_an_unknown_name_is_answered_with_the_nearest() -> None:

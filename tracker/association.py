@@ -82,7 +82,7 @@ def associate(
     if not candidates:
         return Association(None, None, None)
     ranked = [(math.dist(candidate.position, prediction), candidate) for candidate in candidates]
-    farthest = reach(gate, variance)
+    farthest = gate if variance is None else min(gate, math.sqrt(PLAUSIBLE * variance))
     inside = [
         (log_similarity(candidate.box, tracked, size), distance, candidate)
         for distance, candidate in ranked
@@ -93,11 +93,6 @@ def associate(
     weight = 0.0 if variance is None else 0.5 / variance
     score, distance, chosen = max(inside, key=lambda entry: (entry[0] - weight * entry[1] ** 2, -entry[1]))
     return Association(chosen, distance, score)
-
-
-def reach(gate: float, variance: float | None) -> float:
-    """Return how far from its prediction a place may be, m: the gate, or what is `PLAUSIBLE` of this variance, m²."""
-    return gate if variance is None else min(gate, math.sqrt(PLAUSIBLE * variance))
 
 
 def between(box: Box, others: Sequence[Box]) -> bool:

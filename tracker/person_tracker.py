@@ -15,7 +15,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.association import GATE, Association, Candidate, alone, associate, between, reach
+from tracker.association import GATE, Association, Candidate, alone, associate, between
 from tracker.detection.boxes import Detection
 from tracker.geometry import CAMERA_FRAME, CameraMount, Intrinsics, back_project
 from tracker.metrics import area, overlap
@@ -252,8 +252,8 @@ class PersonTracker:
 
     def _follow(self, filter_: PersonFilter, candidates: list[Candidate]) -> Association:
         assert self._last is not None
-        gate = self._settings.gate
-        found = associate(candidates, filter_.position, self._last.box, self._size, gate, self._variance)
+        variance = filter_.covariance[0] + self._settings.measurement_noise if self._in_company else None
+        found = associate(candidates, filter_.position, self._last.box, self._size, self._settings.gate, variance)
         if found.chosen is not None:
             filter_.update(found.chosen.position)
             self._accept(found.chosen)
@@ -334,8 +334,7 @@ class PersonTracker:
         if self._in_company and between(box, others):
             return None
         if self._in_company and expected is not None:
-            away = reach(self._settings.gate, self._variance)
-            return seen_at(depth, box, expected[0] - self._mount.forward, away, alone(box, others))
+            return seen_at(depth, box, expected[0] - self._mount.forward, self._settings.gate, alone(box, others))
         z = box_depth(depth, box)
         if z is None:
             return None
@@ -358,13 +357,6 @@ class PersonTracker:
             self._confirmations,
             processed,
         )
-
-    @property
-    def _variance(self) -> float | None:
-        """Of a measured place around the prediction in each direction, m²; None as long as it does not count."""
-        if self._filter is None or not self._in_company:
-            return None
-        return self._filter.covariance[0] + self._settings.measurement_noise
 
     @property
     def _size(self) -> tuple[int, int]:

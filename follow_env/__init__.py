@@ -14,7 +14,7 @@ IDS = {"corridor": "follow_env/Corridor-v0", "indoor": "follow_env/Indoor-v0"}
 for _scene, _id in IDS.items():
     register(
         _id,
-        entry_point="follow_env.env:FollowEnv",
-        vector_entry_point="follow_env.vector_env:FollowVectorEnv",
+        entry_point="follow_env.envs.follow:FollowEnv",
+        vector_entry_point="follow_env.envs.batch:FollowVectorEnv",
         kwargs={"scene": _scene},
     )

@@ -111,7 +111,7 @@ class CameraConfig:
 class DepthConfig:
     """Errors of a structured-light depth sensor (Xtion/Kinect), applied to the rendered depth.
 
-    The formulas are in `follow_env.camera.sensor.RGBDSensor`. The defaults: noise as measured by Nguyen et al. (2012,
+    The formulas are in `camera.sensor.errors.RGBDSensor`. The defaults: noise as measured by Nguyen et al. (2012,
     Kinect) for surfaces that face the camera; eighths of a pixel of disparity, 75 mm and the loss of the projector's
     shadow as in Khoshelham and Elberink (2012, Kinect); 0.5 m because an Xtion returns nothing nearer, 8 m because it
     quantises to 0.2 m there. The shares lost at edges, on dark and on grazing surfaces are stated, not measured.
@@ -228,7 +228,7 @@ class BoxConfig:
 
 @dataclasses.dataclass(frozen=True)
 class MeasurementConfig:
-    """What a tracker would report, without rendering (`follow_env.measurement`).
+    """What a tracker would report, without rendering (`follow_env.camera.measurement`).
 
     The defaults are what rendered frames give with paper A's depth rule (`follow calibrate`), rounded.
 

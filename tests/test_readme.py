@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from baselines import calibration
-from baselines.benchmark import calibration_report
-from baselines.cli import _parser
+from baselines.cli.main import _parser
+from baselines.followers import calibration
+from baselines.papers.dong2018 import calibration_report
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

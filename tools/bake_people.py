@@ -20,7 +20,7 @@ from base_mesh import BONES, Base
 from dress import BOB, CROP, EYE, HAND, HEAD, LEG, SHOE, SLEEVE, Half, dress
 from reduce_mesh import reduce_mesh
 
-ASSETS = Path(__file__).resolve().parents[1] / "follow_env" / "person" / "assets"
+ASSETS = Path(__file__).resolve().parents[1] / "follow_env" / "world" / "people" / "assets"
 HIGH, LOW = 3300, 1340
 """Triangles of the two levels of detail (hair styles make them vary a little)."""
 

@@ -36,9 +36,9 @@ import numpy as np
 
 from follow_env.camera import CameraPose, PinholeCamera, make_renderer
 from follow_env.config import CameraConfig, RobotConfig
-from follow_env.person.bodies import BODIES, OUTFITS, load_body
-from follow_env.person.walker import Walker
-from follow_env.scenes import SCENES, make_scene
+from follow_env.world.people.bodies import BODIES, OUTFITS, load_body
+from follow_env.world.people.walker import Walker
+from follow_env.world.scenes import SCENES, make_scene
 
 WIDTH, HEIGHT = 640, 480  # of what the detectors get, px; pictures drawn at 320 x 240 are enlarged
 HUMAN = """

@@ -10,9 +10,9 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from baselines.benchmark.assembly import cell_of, driver, environment
+from baselines.benchmark.build import cell_of, driver, environment
 from baselines.benchmark.cells import SCENES
-from baselines.benchmark.episodes import play
+from baselines.benchmark.rollout import play
 from baselines.learned.evaluation import HELD_SEEDS
 from baselines.learned.training import read_curve
 

@@ -12,11 +12,11 @@ import numpy as np
 
 from follow_env.camera import CameraPose, PinholeCamera, RGBDFrame, make_renderer
 from follow_env.config import CameraConfig
-from follow_env.person.bodies import BODIES, load_body
-from follow_env.person.postures import POSTURES
-from follow_env.person.walker import Walker
-from follow_env.scene import Box, Capsule, Cylinder, Light, Material, Scene, Sphere
-from follow_env.scenes import LIGHTS, SCENES, make_scene
+from follow_env.world.people.bodies import BODIES, load_body
+from follow_env.world.people.postures import POSTURES
+from follow_env.world.people.walker import Walker
+from follow_env.world.scene import Box, Capsule, Cylinder, Light, Material, Scene, Sphere
+from follow_env.world.scenes import LIGHTS, SCENES, make_scene
 
 CAMERA = PinholeCamera(CameraConfig(width=240, height=180, supersample=2))
 EYE = CameraPose(4.0, 0.0, 1.0, 0.0)

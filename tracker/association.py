@@ -10,9 +10,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from tracker.depth import LEAST_PART, Box
 from tracker.metrics import area
 from tracker.person_filter import Vector
-from tracker.sampling import LEAST_PART, Box
 
 GATE = 0.30
 """R_thre of eq. (15), m."""

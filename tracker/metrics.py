@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
-from tracker.sampling import Box
+from tracker.depth import Box
 
 MATCH = 0.5
 """Least intersection over union of a detection and the truth that it is taken for."""

@@ -15,9 +15,10 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from follow_env.geometry import CAMERA_FRAME, CameraMount, Intrinsics, back_project
 from tracker.association import GATE, Association, Candidate, alone, associate, between
-from tracker.detection.boxes import Detection
-from tracker.geometry import CAMERA_FRAME, CameraMount, Intrinsics, back_project
+from tracker.boxes import Detection
+from tracker.depth import Box, box_depth, seen_at
 from tracker.metrics import area, overlap
 from tracker.person_filter import (
     ACCELERATION_DENSITY,
@@ -29,7 +30,6 @@ from tracker.person_filter import (
     arc,
     moved,
 )
-from tracker.sampling import Box, box_depth, seen_at
 
 State = Literal["searching", "confirming", "tracking", "coasting", "lost"]
 Twist = tuple[float, float]
@@ -181,7 +181,7 @@ class PersonTracker:
         settings: TrackerSettings | None = None,
     ) -> None:
         if not isinstance(intrinsics, Intrinsics):
-            raise TypeError(f"intrinsics are {intrinsics!r}, expected tracker.geometry.Intrinsics of the pictures.")
+            raise TypeError(f"intrinsics are {intrinsics!r}, expected follow_env.geometry.Intrinsics of the pictures.")
         self._detector, self._intrinsics, self._mount = detector, intrinsics, mount
         self._settings = settings = settings or TrackerSettings()
         self._dt = 1.0 / settings.rate

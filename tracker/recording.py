@@ -25,7 +25,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.geometry import CAMERA_FRAME, CameraMount, Intrinsics
+from follow_env.geometry import CAMERA_FRAME, CameraMount, Intrinsics
 
 CAMERA_FILE = "camera.json"
 COLOUR_FOLDERS = ("color", "rgb")

@@ -19,7 +19,7 @@ SENSORS = {
 """The sensor at each perception unless told otherwise: for Table 1 the emulated one that is fitted to the paper's
 No filter row, and the rule by which depth is read from the rendered or detected box."""
 DEPTH_RULES = ("six_smallest", "grid_mean", "centroid")
-"""Rules of `tracker.sampling` that are compared on rendered frames."""
+"""Rules of `tracker.depth` that are compared on rendered frames."""
 
 Q_SCALES = (0.1, 0.3, 1.0, 3.0, 10.0)
 ALPHAS = (0.01, 0.05, 0.1)

@@ -15,7 +15,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.benchmark.metrics import Row
+from baselines.benchmark.metrics.episode import Row
 
 RESAMPLES = 10_000
 CONFIDENCE = 0.95

@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from baselines.benchmark.episodes import Episode
-from baselines.benchmark.pool import Keyed
+from baselines.benchmark.executors.processes import Keyed
+from baselines.benchmark.rollout import Episode
 
 FILE_NAME = "episodes.sqlite"
 _APPLICATION = 0x666F6C77  # "folw": tells our files from other programs' databases

@@ -15,7 +15,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from stable_baselines3.common.vec_env import VecEnv
 
-from baselines.learned.estimates import BatchFilter
+from tracker.estimators.batch import BatchFilter
 
 _EPISODE_KEYS = ("is_success", "collision")
 

@@ -9,7 +9,7 @@ import torch
 from stable_baselines3 import PPO
 from torch.nn.functional import mse_loss
 
-from baselines.floors import Oracle
+from baselines.followers.references import Oracle
 from baselines.learned.adapter import FollowVecEnv
 
 BATCH = 256

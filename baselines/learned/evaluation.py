@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from baselines.benchmark.assembly import PICTURE
+from baselines.benchmark.build import PICTURE
 from baselines.benchmark.cells import SCENES, Cell
-from baselines.benchmark.episodes import play
-from baselines.learned.agents import Agent
-from follow_env.env import FollowEnv
+from baselines.benchmark.rollout import play
+from baselines.followers.agents import Agent
+from follow_env.envs.follow import FollowEnv
 
 HELD_SEEDS = range(20_000, 20_005)
 """Apart from the seeds of the tables and of the calibration."""

@@ -14,9 +14,9 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecEnv
 from torch import nn
 
-from baselines.learned.networks import CLIP
+from baselines.followers.networks import CLIP
 from baselines.learned.recipes import PPORecipe, Recipe, RecurrentPPORecipe, SACRecipe
-from follow_env.reward import SET_POINT
+from follow_env.envs.task import SET_POINT
 
 OFFSET = (0.0, SET_POINT, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 SCALE = (1.0 / 0.2, 1.0 / 0.3, 1.0, 1.0 / 0.2, 1.0, 1.0, 1.0, 1.0)

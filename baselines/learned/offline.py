@@ -13,7 +13,7 @@ from minari import MinariDataset
 from minari.data_collector import EpisodeBuffer
 from minari.dataset.minari_dataset import parse_dataset_id
 
-from baselines.benchmark.assembly import driver, environment_kwargs
+from baselines.benchmark.build import driver, environment_kwargs
 from baselines.benchmark.cells import ENVIRONMENT_IDS, Cell
 from baselines.benchmark.store import InputError
 

@@ -19,19 +19,19 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import configure
 
 import follow_env
-from baselines.benchmark.assembly import PICTURE
+from baselines.benchmark.build import PICTURE
 from baselines.benchmark.cells import ENVIRONMENT_IDS, SCENES
-from baselines.benchmark.configuration import machine, packages
 from baselines.benchmark.files import write_csv, write_text
+from baselines.benchmark.provenance import machine, packages
 from baselines.benchmark.store import InputError
-from baselines.calibration import noise_model
+from baselines.followers.agents import SUFFIX, Agent, Card, save_agent
+from baselines.followers.calibration import noise_model
 from baselines.learned.adapter import FollowVecEnv
-from baselines.learned.agents import SUFFIX, Agent, Card, save_agent
 from baselines.learned.cloning import clone_oracle
-from baselines.learned.estimates import BatchFilter
 from baselines.learned.evaluation import CURVE_COLUMNS, HELD_SEEDS, SCORES, evaluate
 from baselines.learned.models import load_model, make_model, policy_arrays
 from baselines.learned.recipes import CONTROL_HZ, Domain, PPORecipe, Recipe, SACRecipe
+from tracker.estimators.batch import BatchFilter
 
 _CURVE, _CONFIG = "curve.csv", "config.json"
 

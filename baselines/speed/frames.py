@@ -16,11 +16,11 @@ import numpy as np
 
 from baselines.speed.timing import Cost, measure
 from follow_env.camera import RENDERERS, CameraPose, PinholeCamera, Renderer, make_renderer
-from follow_env.camera.mesh import Placed
 from follow_env.config import CameraConfig
-from follow_env.person.bodies import load_body
-from follow_env.person.walker import Walker
-from follow_env.scenes import make_scene
+from follow_env.world.people.bodies import load_body
+from follow_env.world.people.mesh import Placed
+from follow_env.world.people.walker import Walker
+from follow_env.world.scenes import make_scene
 
 SCENE = "indoor"
 PEER = "tiny"

@@ -8,10 +8,10 @@ from functools import partial
 
 from baselines.speed.timing import Cost, measure
 from follow_env.config import RobotConfig
-from follow_env.physics import PHYSICS_HZ, SOLVER_ITERATIONS, World
-from follow_env.robot import DiffDrive, advance
-from follow_env.scene import Material, Scene
-from follow_env.scenes import make_scene
+from follow_env.world.bullet import PHYSICS_HZ, SOLVER_ITERATIONS, World
+from follow_env.world.robots.diff_drive import DiffDrive, advance
+from follow_env.world.scene import Material, Scene
+from follow_env.world.scenes import make_scene
 
 ITERATIONS = (5, 10, 20, 50)
 MOTIONS = ((0.85, 0.0), (0.85, 1.0), (0.0, 1.0), (0.6, -1.5), (1.2, 2.0), (-0.5, 0.5))

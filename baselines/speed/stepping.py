@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from baselines.policy import make_follower
+from baselines.followers.policy import make_follower
 from baselines.speed.timing import Cost, measure
-from follow_env.env import FollowEnv
-from follow_env.physics import World
+from follow_env.envs.follow import FollowEnv
+from follow_env.world.bullet import World
 
 BARE = "8 bare physics steps"
 SPEED = 0.48

@@ -6,8 +6,8 @@ import dataclasses
 import importlib.metadata
 import json
 
-from baselines.benchmark.configuration import machine, packages
-from baselines.benchmark.report import markdown_table
+from baselines.benchmark.provenance import machine, packages
+from baselines.papers.dong2018.report import markdown_table
 from baselines.speed import Report
 from baselines.speed.batch import BatchRate
 from baselines.speed.frames import FrameCost
@@ -15,7 +15,7 @@ from baselines.speed.pair import Gain
 from baselines.speed.solver import SolverCost
 from baselines.speed.stepping import StepCost
 from baselines.speed.timing import Cost
-from follow_env.physics import SOLVER_ITERATIONS
+from follow_env.world.bullet import SOLVER_ITERATIONS
 
 TIMES = ("median (ms)", "fastest (ms)", "CPU median (ms)", "CPU fastest (ms)")
 

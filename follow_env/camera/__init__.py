@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from follow_env.camera.frame import RGBDFrame
-from follow_env.camera.mesh import Placed
 from follow_env.camera.pinhole import CameraPose, PinholeCamera
 from follow_env.config import choose
-from follow_env.scene import Scene
+from follow_env.world.people.mesh import Placed
+from follow_env.world.scene import Scene
 
 __all__ = ["RENDERERS", "CameraPose", "PinholeCamera", "RGBDFrame", "Renderer", "make_renderer"]
 
@@ -32,9 +32,9 @@ def make_renderer(name: str, scene: Scene, camera: PinholeCamera) -> Renderer:
 
         return TinyRenderer(scene, camera)
     if name == "opengl":
-        from follow_env.camera.opengl import OpenGLRenderer
+        from follow_env.camera.opengl.renderer import OpenGLRenderer
 
         return OpenGLRenderer(scene, camera)
-    from follow_env.camera.raster import RasterRenderer
+    from follow_env.camera.raster.renderer import RasterRenderer
 
     return RasterRenderer(scene, camera)

@@ -14,9 +14,9 @@ import numpy as np
 import pybullet
 
 from follow_env.camera.frame import RGBDFrame
-from follow_env.camera.mesh import Mesh, Placed
 from follow_env.camera.pinhole import CameraPose, PinholeCamera
-from follow_env.scene import Box, Capsule, Primitive, Scene, Sphere
+from follow_env.world.people.mesh import Mesh, Placed
+from follow_env.world.scene import Box, Capsule, Primitive, Scene, Sphere
 
 LIGHT_DIRECTION = (0.25, 0.45, 1.0)
 AWAY = (0.0, 0.0, -1000.0)

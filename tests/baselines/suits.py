@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracker.detection.boxes import Detection
+from tracker.boxes import Detection
 from tracker.person_tracker import Detector
 
 

@@ -16,11 +16,11 @@ import gymnasium as gym
 import numpy as np
 
 from baselines.benchmark.cells import Cell
-from baselines.benchmark.configuration import Plan
-from baselines.benchmark.episodes import Episode, play
-from baselines.benchmark.reproduce import reproduce
-from baselines.calibration import NoiseModel
-from baselines.policy import Follower, make_estimator, perceive_measurement
+from baselines.benchmark.provenance import Plan
+from baselines.benchmark.rollout import Episode, play
+from baselines.followers.calibration import NoiseModel
+from baselines.followers.policy import Follower, make_estimator, perceive_measurement
+from baselines.papers.dong2018.reproduce import reproduce
 
 DT = 1.0 / 30.0
 SENSORS = ("clean", "heavy_tails")

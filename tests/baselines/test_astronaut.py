@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 import torch
 
-from baselines import cli
-from baselines.astronaut import table2, table3
-from baselines.astronaut.experiments import EXPERIMENTS, tasks
-from baselines.astronaut.nets import Nets
-from baselines.astronaut.reproduce import reproduce
-from baselines.astronaut.table2 import NETS
-from baselines.benchmark.running import Interrupted
+from baselines.benchmark.run import Interrupted
 from baselines.benchmark.store import InputError
-from follow_env.person.walker import POSTURES
+from baselines.cli.main import main as cli
+from baselines.papers.zhang2018 import table2, table3
+from baselines.papers.zhang2018.experiments import EXPERIMENTS, tasks
+from baselines.papers.zhang2018.nets import Nets
+from baselines.papers.zhang2018.reproduce import reproduce
+from baselines.papers.zhang2018.sequences import TABLE_2, Sequence, count, play
+from baselines.papers.zhang2018.table2 import NETS
+from follow_env.world.people.walker import POSTURES
+from tracker.boxes import Detection
 from tracker.detection import detector as detecting
-from tracker.detection.boxes import Detection
-from tracker.detection.sequences import TABLE_2, Sequence, count, play
 
 FILM = Sequence("green", 1, 2 * len(POSTURES))
 WEIGHTS = {net: "0" * 64 for net in NETS}

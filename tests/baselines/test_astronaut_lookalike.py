@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from baselines.astronaut.experiments import Part, Player, Rows
-from baselines.astronaut.lookalike import COLUMNS, HALF, NEAR, TOUCH, Frame, film, play, table
-from baselines.astronaut.script import OTHER, TARGET, Cast, draw_script
-from baselines.astronaut.stage import CAMERA, Stage, stage
-from tracker.detection.boxes import Detection
+from baselines.papers.zhang2018.experiments import Part, Player, Rows
+from baselines.papers.zhang2018.lookalike import COLUMNS, HALF, NEAR, TOUCH, Frame, film, play, table
+from baselines.papers.zhang2018.script import OTHER, TARGET, Cast, draw_script
+from baselines.papers.zhang2018.stage import CAMERA, Stage, stage
+from tracker.boxes import Detection
 
 SEEDS = (2, 15)
 NAMES = {TARGET: "target", OTHER: "other"}

@@ -5,9 +5,9 @@ from itertools import pairwise
 
 import pytest
 
-from baselines.astronaut import rectangle
-from baselines.astronaut.experiments import Part, Player, Rows
-from baselines.astronaut.rectangle import COLUMNS, CORNERS, GAP_FRAMES, GAPS, RUNS, play, table
+from baselines.papers.zhang2018 import rectangle
+from baselines.papers.zhang2018.experiments import Part, Player, Rows
+from baselines.papers.zhang2018.rectangle import COLUMNS, CORNERS, GAP_FRAMES, GAPS, RUNS, play, table
 
 
 @pytest.fixture(scope="module")

@@ -6,12 +6,12 @@ import math
 import numpy as np
 import pytest
 
-from baselines import calibration
-from baselines.benchmark import calibrate
-from baselines.benchmark.calibrate import DT, _fit, _summarise
+from baselines.followers import calibration
+from baselines.papers.dong2018 import calibrate
+from baselines.papers.dong2018.calibrate import DT, _fit, _summarise
+from follow_env.camera.measurement import MeasurementModel
 from follow_env.config import MeasurementConfig
-from follow_env.measurement import MeasurementModel
-from tracker.sampling import RULES
+from tracker.depth import RULES
 
 CONFIG = MeasurementConfig(
     bearing_bias=0.002,

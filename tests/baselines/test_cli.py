@@ -14,12 +14,12 @@ from pathlib import Path
 
 import pytest
 
-from baselines import cli
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.store import FILE_NAME
+from baselines.cli.main import main as cli
 
 ROOT = Path(__file__).resolve().parents[2]
-FOLLOW = [sys.executable, "-m", "baselines.cli"]
+FOLLOW = [sys.executable, "-m", "baselines.cli.main"]
 TABLE1 = ["reproduce", "table1", "--perception", "truth", "--episodes", "1", "--jobs", "1"]
 
 
@@ -183,8 +183,9 @@ def test_a_terminal_shows_a_bar(tmp_path: Path) -> None:
 def test_watch_and_calibrate_get_what_was_asked_for(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from baselines import calibration, watch
-    from baselines.benchmark import calibrate
+    from baselines.followers import calibration
+    from baselines.papers.dong2018 import calibrate
+    from baselines.viewing import watch
 
     asked: list[object] = []
     monkeypatch.setattr(watch, "watch", lambda *given, **also: asked.append((*given, also)) or "a summary")
@@ -200,7 +201,7 @@ def test_watch_and_calibrate_get_what_was_asked_for(
 
 
 def test_what_watch_refuses_is_bad_input(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    from baselines import watch
+    from baselines.viewing import watch
 
     def refuse(*_: object, **__: object) -> str:
         raise ValueError("the video cannot be written; name it .mp4")

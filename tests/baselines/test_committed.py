@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from baselines import calibration
-from baselines.benchmark import configuration
+from baselines.benchmark import provenance as configuration
 from baselines.benchmark.cells import Cell
-from baselines.benchmark.configuration import Plan
-from baselines.benchmark.episodes import Player
 from baselines.benchmark.files import write_csv
-from baselines.benchmark.table1 import COLUMNS, Table1
+from baselines.benchmark.provenance import Plan
+from baselines.benchmark.rollout import Player
+from baselines.followers import calibration
+from baselines.papers.dong2018.table1 import COLUMNS, Table1
 
 RUN = Path(__file__).parents[2] / "results" / "table1"
 

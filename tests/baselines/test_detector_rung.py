@@ -10,22 +10,26 @@ import cv2
 import numpy as np
 import pytest
 
-from baselines import cli, policy, watch
-from baselines.benchmark import assembly, calibrate, figures, tracking
-from baselines.benchmark.calibrate import DT, error_statistics
-from baselines.benchmark.calibrate_detector import tracked_errors
+from baselines.benchmark import build as assembly
 from baselines.benchmark.cells import Cell, table1_cells
-from baselines.benchmark.configuration import Plan
-from baselines.benchmark.episodes import Player
-from baselines.benchmark.reproduce import reproduce
-from baselines.benchmark.tracking import TrackingMetrics
-from baselines.calibration import NoiseModel
-from baselines.policy import LOOK_RATE, make_follower
+from baselines.benchmark.metrics.episode import tracking
+from baselines.benchmark.metrics.tracking import TrackingMetrics
+from baselines.benchmark.provenance import Plan
+from baselines.benchmark.rollout import Player
+from baselines.cli.main import main as cli
+from baselines.followers import policy
+from baselines.followers.calibration import NoiseModel
+from baselines.followers.policy import LOOK_RATE, make_follower
+from baselines.papers.dong2018 import calibrate, figures
+from baselines.papers.dong2018.calibrate import DT, error_statistics
+from baselines.papers.dong2018.calibrate_detector import tracked_errors
+from baselines.papers.dong2018.reproduce import reproduce
+from baselines.viewing import watch
+from follow_env.camera.measurement import MeasurementModel
 from follow_env.config import CameraConfig, MeasurementConfig, RobotConfig
-from follow_env.env import FollowEnv
-from follow_env.measurement import MeasurementModel
-from follow_env.view import Dashboard
-from tracker.detection.boxes import Detection
+from follow_env.envs.dashboard import Dashboard
+from follow_env.envs.follow import FollowEnv
+from tracker.boxes import Detection
 from tracker.detection.detector import GRID, PersonDetector
 from tracker.detection.networks import make_network
 from tracker.detection.weights import save_weights

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from baselines.benchmark.engines import following, motion
+from baselines.suites.engines import following, motion
 from follow_env import IDS
 
 

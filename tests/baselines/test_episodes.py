@@ -2,11 +2,11 @@
 
 import pytest
 
-from baselines.benchmark.assembly import driver, environment
+from baselines.benchmark.build import driver, environment
 from baselines.benchmark.cells import Cell
-from baselines.benchmark.episodes import play
-from baselines.policy import make_follower
-from follow_env.env import FollowEnv
+from baselines.benchmark.rollout import play
+from baselines.followers.policy import make_follower
+from follow_env.envs.follow import FollowEnv
 
 
 class Witness:

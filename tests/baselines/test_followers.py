@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.stats import trim_mean
 
-from baselines.benchmark.assembly import cell_of
+from baselines.benchmark.build import cell_of
 from baselines.benchmark.cells import Cell
-from baselines.benchmark.episodes import Player
-from baselines.benchmark.followers import COLUMNS, REFERENCE, policy_name, records, report
-from baselines.benchmark.metrics import COLUMNS as ROW_COLUMNS
-from baselines.benchmark.metrics import Row
+from baselines.benchmark.metrics.episode import COLUMNS as ROW_COLUMNS
+from baselines.benchmark.metrics.episode import Row
+from baselines.benchmark.rollout import Player
 from baselines.benchmark.statistics import Score, interquartile_mean
+from baselines.suites.followers import COLUMNS, REFERENCE, policy_name, records, report
 
 RNG = np.random.default_rng(8)
 

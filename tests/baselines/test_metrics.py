@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from baselines.benchmark.cells import Cell
-from baselines.benchmark.metrics import COLUMNS, EpisodeMetrics, Row, quantile
-from tracker.filters import Estimate
+from baselines.benchmark.metrics.episode import COLUMNS, EpisodeMetrics, Row, quantile
+from tracker.estimators.filters import Estimate
 
 CELL = Cell("emulated", "indoor", "akf")
 DT = 1.0 / 30.0

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 import follow_env
-from baselines.calibration import NoiseModel
-from baselines.policy import Follower, make_follower, make_perception, perceive_measurement
-from tracker.filters import NoFilter
+from baselines.followers.calibration import NoiseModel
+from baselines.followers.policy import Follower, make_follower, make_perception, perceive_measurement
+from tracker.estimators.filters import NoFilter
 
 NOISE = NoiseModel((1e-4, 1e-2), (1e-4, 1e-3), (1e-2, 1e-1))
 
@@ -91,7 +91,7 @@ def test_actions_stay_in_the_action_space():
 @pytest.mark.parametrize("scene", follow_env.IDS)
 @pytest.mark.parametrize("perception", ["truth", "emulated", "mask"])
 def test_every_perception_reads_its_observation_and_agrees_with_the_truth(perception, scene):
-    from baselines.policy import OBSERVATION_OF
+    from baselines.followers.policy import OBSERVATION_OF
 
     env = gym.make(follow_env.IDS[scene], obs=OBSERVATION_OF[perception], sensor="ideal", disable_env_checker=True)
     obs, info = env.reset(seed=3)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from baselines.benchmark.cells import Cell
-from baselines.benchmark.curves import curve_records
-from baselines.benchmark.explain import explain
-from baselines.benchmark.metrics import Row
-from baselines.benchmark.report import markdown_table, report
-from baselines.benchmark.table1 import PAPER_RMSE, Table1
+from baselines.benchmark.metrics.episode import Row
+from baselines.papers.dong2018.curves import curve_records
+from baselines.papers.dong2018.explain import explain
+from baselines.papers.dong2018.report import markdown_table, report
+from baselines.papers.dong2018.table1 import PAPER_RMSE, Table1
 
 
 def test_curves_are_means_and_bands_over_episodes_ten_times_a_second() -> None:

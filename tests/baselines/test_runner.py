@@ -15,11 +15,11 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from baselines.benchmark import pool
 from baselines.benchmark.cells import Cell, family_cells, rule_cells, sensitivity_cells, table1_cells
-from baselines.benchmark.configuration import Plan
-from baselines.benchmark.pool import EpisodeError, play_all
+from baselines.benchmark.executors import processes as pool
+from baselines.benchmark.executors.processes import EpisodeError, play_all
 from baselines.benchmark.progress import progress
+from baselines.benchmark.provenance import Plan
 
 ROOT = Path(__file__).resolve().parents[2]
 CELL = Cell("emulated", "corridor", "kf")
@@ -188,7 +188,7 @@ def test_progress_on_a_terminal_is_a_bar(monkeypatch: pytest.MonkeyPatch, capsys
 
 @pytest.fixture
 def player() -> Iterator[object]:
-    from baselines.benchmark.episodes import Player
+    from baselines.benchmark.rollout import Player
 
     player = Player()
     yield player

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines import cli, speed
+from baselines import speed
+from baselines.cli.main import main as cli
 from baselines.speed import frames, pair, timing
 from baselines.speed.batch import PEER, BatchRate
 from baselines.speed.frames import FrameCost
@@ -19,7 +20,7 @@ from baselines.speed.table import document, table
 from baselines.speed.timing import Cost
 from follow_env import IDS
 from follow_env.camera import RENDERERS
-from follow_env.physics import SOLVER_ITERATIONS
+from follow_env.world.bullet import SOLVER_ITERATIONS
 
 SIZE = (48, 36)
 LEAST = speed.Effort(frames=2, steps=2, resets=2, rounds=1, seconds=0.01, sizes=(SIZE,), batches=(3,))

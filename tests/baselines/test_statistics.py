@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from baselines.benchmark.metrics import Row
+from baselines.benchmark.metrics.episode import Row
 from baselines.benchmark.statistics import NEGLIGIBLE, Difference, PooledError, share_interval, weighted_share
 
 

@@ -18,15 +18,15 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from baselines.benchmark import configuration
-from baselines.benchmark import reproduce as reproduction
+from baselines.benchmark import provenance as configuration
 from baselines.benchmark.cells import Cell
-from baselines.benchmark.configuration import Plan, digest, settings
 from baselines.benchmark.files import write_text
-from baselines.benchmark.reproduce import reproduce
-from baselines.benchmark.running import Interrupted
+from baselines.benchmark.provenance import Plan, digest, settings
+from baselines.benchmark.run import Interrupted
 from baselines.benchmark.store import FILE_NAME, InputError, Store
-from baselines.benchmark.table1 import COLUMNS, PAPER_RMSE, paper_ratio
+from baselines.papers.dong2018 import reproduce as reproduction
+from baselines.papers.dong2018.reproduce import reproduce
+from baselines.papers.dong2018.table1 import COLUMNS, PAPER_RMSE, paper_ratio
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).parent
@@ -390,7 +390,8 @@ FEATURES = ("", "AVX512F AVX512_SKX AVX2 FMA3")
 
 
 def test_real_results_do_not_depend_on_processes_or_on_the_cpus_features(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "baselines.cli", "reproduce", "table1", "--perception", "truth", "--episodes", "2"]
+    follow = [sys.executable, "-m", "baselines.cli.main"]
+    command = [*follow, "reproduce", "table1", "--perception", "truth", "--episodes", "2"]
     for name, jobs, features in zip(("one", "two"), ("1", "2"), FEATURES, strict=True):
         environment = {**os.environ, "PYTHONPATH": str(ROOT), "NPY_DISABLE_CPU_FEATURES": features}
         subprocess.run(
@@ -404,7 +405,7 @@ def test_real_results_do_not_depend_on_processes_or_on_the_cpus_features(tmp_pat
 def test_real_episodes_do_not_depend_on_the_cpus_features(perception: str) -> None:
     script = (
         "from baselines.benchmark.cells import Cell\n"
-        "from baselines.benchmark.episodes import Player\n"
+        "from baselines.benchmark.rollout import Player\n"
         f"episode = Player()(Cell({perception!r}, 'indoor', 'akf'), 0)\n"
         "print(episode.row, episode.curve.tobytes().hex())\n"
     )

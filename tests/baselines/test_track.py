@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 import pytest
 
-from baselines import cli
-from baselines.track import COLUMNS, track
-from follow_env.env import FollowEnv
-from tracker.detection.boxes import Detection
+from baselines.cli.main import main as cli
+from baselines.viewing.track import COLUMNS, track
+from follow_env.envs.follow import FollowEnv
+from tracker.boxes import Detection
 from tracker.recording import Recording
 
 FRAMES = 60

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from baselines.policy import LOOK_RATE, TrackingFollower, make_follower
+from baselines.followers.policy import LOOK_RATE, TrackingFollower, make_follower
 from follow_env.config import CameraConfig, RobotConfig
-from follow_env.env import FollowEnv
-from tracker.detection.boxes import Detection
+from follow_env.envs.follow import FollowEnv
+from tracker.boxes import Detection
 
 CAMERA = {"width": 160, "height": 120}
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from baselines.benchmark.cells import Cell
-from baselines.watch import watch
+from baselines.viewing.watch import watch
 from follow_env.camera import PinholeCamera
-from follow_env.camera.opengl import OpenGLRenderer
+from follow_env.camera.opengl.renderer import OpenGLRenderer
 from follow_env.config import CameraConfig
-from follow_env.env import FollowEnv
-from follow_env.scenes import make_scene
+from follow_env.envs.follow import FollowEnv
+from follow_env.world.scenes import make_scene
 
 CELL = Cell("emulated", "corridor", "akf")
 

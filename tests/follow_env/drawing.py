@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 
 from follow_env.camera import CameraPose, PinholeCamera
-from follow_env.camera.mesh import Mesh, Placed
-from follow_env.camera.raster import RasterRenderer
+from follow_env.camera.raster.renderer import RasterRenderer
 from follow_env.config import CameraConfig
-from follow_env.scene import Box, Capsule, Cylinder, Light, Material, Scene, Sphere
+from follow_env.world.people.mesh import Mesh, Placed
+from follow_env.world.scene import Box, Capsule, Cylinder, Light, Material, Scene, Sphere
 
 SMALL = PinholeCamera(CameraConfig(width=160, height=120))
 GREY, RED = Material((0.5, 0.5, 0.5)), Material((0.7, 0.2, 0.1))

@@ -9,9 +9,9 @@ import pytest
 import follow_env
 from follow_env.camera import RENDERERS, CameraPose, PinholeCamera, make_renderer
 from follow_env.config import CameraConfig
-from follow_env.person.bodies import load_body
-from follow_env.person.walker import Walker
-from follow_env.scene import Box, Light, Material, Scene
+from follow_env.world.people.bodies import load_body
+from follow_env.world.people.walker import Walker
+from follow_env.world.scene import Box, Light, Material, Scene
 
 GREY = Material((0.5, 0.5, 0.5))
 LAMP = (Light((0.0, 0.0, 3.0), 1.0),)

@@ -248,7 +248,7 @@ def test_an_unknown_keyword_is_named():
 def test_every_setting_is_offered_when_one_is_unknown():
     import inspect
 
-    from follow_env.env import SETTINGS, FollowEnv
+    from follow_env.envs.follow import SETTINGS, FollowEnv
 
     assert (*inspect.signature(FollowEnv).parameters,) == (*SETTINGS, "unknown")
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from follow_env.config import RobotConfig
-from follow_env.physics import PHYSICS_HZ, World
-from follow_env.robot import DiffDrive, advance
-from follow_env.scene import Material, Scene
+from follow_env.world.bullet import PHYSICS_HZ, World
+from follow_env.world.robots.diff_drive import DiffDrive, advance
+from follow_env.world.scene import Material, Scene
 
 PLAIN = Scene("plain", (), Material((0.5, 0.5, 0.5)), (), 0.3, (-50.0, 50.0, -50.0, 50.0))
 FAR_AWAY = (30.0, 30.0, 0.0)

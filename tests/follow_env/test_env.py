@@ -15,7 +15,7 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
 
 from follow_env import IDS
-from follow_env.env import OBSERVATIONS
+from follow_env.envs.follow import OBSERVATIONS
 
 SMALL = {"width": 48, "height": 36}
 EVERY = list(itertools.product(IDS.values(), OBSERVATIONS))

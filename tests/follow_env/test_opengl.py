@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 
 from follow_env.camera import CameraPose, PinholeCamera, make_renderer
-from follow_env.camera.opengl import OpenGLRenderer
-from follow_env.camera.raster import RasterRenderer
-from follow_env.camera.textures import TEXTURES
+from follow_env.camera.opengl.renderer import OpenGLRenderer
+from follow_env.camera.raster.renderer import RasterRenderer
+from follow_env.camera.raster.textures import TEXTURES
 from follow_env.config import CameraConfig
-from follow_env.env import FollowEnv
-from follow_env.person.bodies import BODIES, load_body
-from follow_env.person.walker import Walker
-from follow_env.scene import Box, Capsule, Cylinder, Light, Material, Scene, Sphere
-from follow_env.scenes import SCENES, make_scene
+from follow_env.envs.follow import FollowEnv
+from follow_env.world.people.bodies import BODIES, load_body
+from follow_env.world.people.walker import Walker
+from follow_env.world.scene import Box, Capsule, Cylinder, Light, Material, Scene, Sphere
+from follow_env.world.scenes import SCENES, make_scene
 
 SMALL = PinholeCamera(CameraConfig(width=160, height=120))
 GREY = Material((0.5, 0.5, 0.5))

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from follow_env.person.bodies import ASSETS, BODIES, DETAILS, MATERIALS, OUTFITS, Outfit, load_body
-from follow_env.person.stride import FOOT, HAND, HEAD, LEFT, RIGHT, SHIN, THIGH
-from follow_env.person.walker import POSTURES, Walker
-from follow_env.physics import PERSON_HEIGHT, PERSON_RADIUS
+from follow_env.world.bullet import PERSON_HEIGHT, PERSON_RADIUS
+from follow_env.world.people.bodies import ASSETS, BODIES, DETAILS, MATERIALS, OUTFITS, Outfit, load_body
+from follow_env.world.people.stride import FOOT, HAND, HEAD, LEFT, RIGHT, SHIN, THIGH
+from follow_env.world.people.walker import POSTURES, Walker
 
 SPEEDS = (0.25, 0.8, 1.2, 1.4, 1.6)
 WALKING = (0.0, 0.1, 0.25, 0.8, 1.15)

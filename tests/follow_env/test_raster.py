@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from follow_env.camera import CameraPose, PinholeCamera, make_renderer
-from follow_env.camera.raster import RasterRenderer
+from follow_env.camera.raster.renderer import RasterRenderer
 from follow_env.config import CameraConfig
-from follow_env.scene import Box, Capsule, Cylinder, Light, Sphere
-from follow_env.scenes import make_scene
+from follow_env.world.scene import Box, Capsule, Cylinder, Light, Sphere
+from follow_env.world.scenes import make_scene
 
 from .drawing import GREY, RED, SMALL, blob, flat, reference, scene
 

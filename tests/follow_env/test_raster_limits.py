@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from follow_env.camera import CameraPose, PinholeCamera
-from follow_env.camera.mesh import Mesh, Placed
-from follow_env.camera.raster import RasterRenderer
+from follow_env.camera.raster.renderer import RasterRenderer
 from follow_env.config import CameraConfig
-from follow_env.scene import Box, Capsule, Cylinder, Light, Material, Sphere
-from follow_env.scenes import make_scene
+from follow_env.world.people.mesh import Mesh, Placed
+from follow_env.world.scene import Box, Capsule, Cylinder, Light, Material, Sphere
+from follow_env.world.scenes import make_scene
 
 from .drawing import RED, SMALL, blob, frames_hash, reference, scene
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from follow_env.camera import CameraPose, PinholeCamera
-from follow_env.camera.raster import RasterRenderer
+from follow_env.camera.raster.renderer import RasterRenderer
 from follow_env.camera.tiny import TinyRenderer
 from follow_env.config import CameraConfig
-from follow_env.person.bodies import BODIES, load_body
-from follow_env.person.walker import Walker
-from follow_env.scene import Box, Capsule, Cylinder, Sphere
-from follow_env.scenes import SCENES, make_scene
+from follow_env.world.people.bodies import BODIES, load_body
+from follow_env.world.people.walker import Walker
+from follow_env.world.scene import Box, Capsule, Cylinder, Sphere
+from follow_env.world.scenes import SCENES, make_scene
 
 from .drawing import RED, SMALL, flat, scene
 

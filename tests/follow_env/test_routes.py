@@ -7,9 +7,18 @@ import math
 import numpy as np
 import pytest
 
-from follow_env.routes import CLEARANCE, PAPER_SPEED, ROUTES, TABLE_STEP, Route, Turn, check_walking_speed, make_route
-from follow_env.scene import Box
-from follow_env.scenes import make_scene
+from follow_env.world.motion.routes import (
+    CLEARANCE,
+    PAPER_SPEED,
+    ROUTES,
+    TABLE_STEP,
+    Route,
+    Turn,
+    check_walking_speed,
+    make_route,
+)
+from follow_env.world.scene import Box
+from follow_env.world.scenes import make_scene
 
 SEEDS = 200
 START = (1.5, 0.1, 0.0)

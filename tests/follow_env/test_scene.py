@@ -10,10 +10,10 @@ import pytest
 import follow_env
 from follow_env.camera import CameraPose, make_renderer
 from follow_env.config import RobotConfig
-from follow_env.physics import World
-from follow_env.scene import Box, Capsule, Cylinder, Material, Sphere
-from follow_env.scenes import LIGHTS, SCENES, make_scene
-from follow_env.view import Dashboard
+from follow_env.envs.dashboard import Dashboard
+from follow_env.world.bullet import World
+from follow_env.world.scene import Box, Capsule, Cylinder, Material, Sphere
+from follow_env.world.scenes import LIGHTS, SCENES, make_scene
 
 from .drawing import RED, SMALL, scene
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from follow_env.camera import PinholeCamera, RGBDFrame
-from follow_env.camera.sensor import RGBDSensor
+from follow_env.camera.sensor.errors import RGBDSensor
 from follow_env.config import HARSH_SENSOR, IDEAL_SENSOR, CameraConfig, ColourConfig, DepthConfig, SensorConfig
 
 WIDTH, HEIGHT = 250, 200

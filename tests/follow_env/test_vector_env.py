@@ -7,10 +7,10 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 from follow_env import IDS
-from follow_env.env import FollowEnv
-from follow_env.reward import SET_POINT
-from follow_env.vector.philox import philox
-from follow_env.vector_env import FollowVectorEnv
+from follow_env.envs.batch import FollowVectorEnv
+from follow_env.envs.follow import FollowEnv
+from follow_env.envs.task import SET_POINT
+from follow_env.world.kinematic.philox import philox
 
 CRASH = {"robot_pose": (1.0, 1.2, 1.5)}
 

@@ -9,13 +9,13 @@ from scipy import optimize, stats
 
 from follow_env import IDS
 from follow_env.config import RobotConfig
-from follow_env.env import FollowEnv
-from follow_env.physics import World
-from follow_env.routes import make_route
-from follow_env.scenes import make_scene
-from follow_env.vector.drive import roll
-from follow_env.vector.place import free_sight, pack_place, touches_person, touches_place
-from follow_env.vector_env import FollowVectorEnv
+from follow_env.envs.batch import FollowVectorEnv
+from follow_env.envs.follow import FollowEnv
+from follow_env.world.bullet import World
+from follow_env.world.kinematic.drive import roll
+from follow_env.world.kinematic.place import free_sight, pack_place, touches_person, touches_place
+from follow_env.world.motion.routes import make_route
+from follow_env.world.scenes import make_scene
 
 BAD_SENSOR = {"measurement": {"outlier_share": 0.2, "miss_share": 0.1}}
 touches = njit(lambda *pose: touches_place(*pose))

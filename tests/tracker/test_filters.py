@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tracker.filters import (
+from tracker.estimators.filters import (
     AdaptiveKalmanFilter,
     AugmentedKalmanFilter,
     KalmanFilter,

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tracker.geometry import (
+from follow_env.geometry import (
     DONG_2018,
     XTION_PRO,
     CameraMount,

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from follow_env.geometry import XTION_PRO, CameraMount, project
 from tracker.association import GATE
-from tracker.detection.boxes import Detection
-from tracker.geometry import XTION_PRO, CameraMount, project
+from tracker.boxes import Detection
 from tracker.person_filter import arc, moved
 from tracker.person_tracker import PersonTracker, TrackerSettings
 
@@ -483,7 +483,7 @@ def test_bad_input_is_one_sentence():
         show.tracker.update(rgb, (1000 * depth).astype(np.uint16))
     with pytest.raises(ValueError, match="twist"):
         show.tracker.update(rgb, depth, (math.nan, 0.0))
-    with pytest.raises(TypeError, match=r"intrinsics are None, expected tracker.geometry.Intrinsics"):
+    with pytest.raises(TypeError, match=r"intrinsics are None, expected follow_env.geometry.Intrinsics"):
         PersonTracker(Scripted(), None)
     with pytest.raises(ValueError, match="expected finite pixels: a point"):
         show.tracker.confirm((1.0, 2.0, 3.0))

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tracker.geometry import CAMERA_FRAME, CameraMount
+from follow_env.geometry import CAMERA_FRAME, CameraMount
 from tracker.recording import Recording, UnreadableFrame
 
 CAMERA = {"width": 32, "height": 24, "fx": 30.0, "fy": 31.0, "cx": 16.0, "cy": 12.0, "fps": 30}

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from follow_env.geometry import XTION_PRO, project
 from tracker.association import alone
-from tracker.geometry import XTION_PRO, project
-from tracker.sampling import RULES, box_depth, measure, seen_at
+from tracker.depth import RULES, box_depth, measure, seen_at
 
 GRID = (2, 3, 5, 6, 8)  # rows and columns of the 5x5 grid in a box over a 10x10 picture
 WHOLE = (0.0, 0.0, 10.0, 10.0)

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from follow_env.config import choose
-from tracker.detection.boxes import Detection, area, nms, vote
+from tracker.boxes import Detection, area, nms, vote
 from tracker.detection.networks import DEPTH_RANGE, NETS, MultiBoxNet
 from tracker.detection.priors import INPUT_SIZE, decode, prior_boxes
 from tracker.detection.weights import load_network

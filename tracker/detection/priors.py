@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.detection.boxes import iou
+from tracker.boxes import iou
 
 INPUT_SIZE = 300
 """Side of the picture that every network takes, px."""

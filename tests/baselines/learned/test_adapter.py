@@ -6,9 +6,9 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 import follow_env
-from baselines.calibration import NoiseModel
+from baselines.followers.calibration import NoiseModel
 from baselines.learned.adapter import FollowVecEnv
-from baselines.learned.estimates import BatchFilter
+from tracker.estimators.batch import BatchFilter
 
 CORRIDOR, INDOOR = follow_env.IDS["corridor"], follow_env.IDS["indoor"]
 

@@ -11,12 +11,12 @@ import pytest
 from safetensors.numpy import load_file, save_file
 
 from baselines.benchmark.cells import Cell
-from baselines.benchmark.episodes import Player
-from baselines.benchmark.followers import cells, speed_cells
-from baselines.learned.agents import SUFFIX, load_agent, save_agent, shipped, weights_file
+from baselines.benchmark.rollout import Player
+from baselines.followers.agents import SUFFIX, load_agent, save_agent, shipped, weights_file
 from baselines.learned.recipes import RECIPES
-from follow_env.env import FollowEnv
-from follow_env.routes import PAPER_SPEED
+from baselines.suites.followers import cells, speed_cells
+from follow_env.envs.follow import FollowEnv
+from follow_env.world.motion.routes import PAPER_SPEED
 
 RUN = Path(__file__).parents[3] / "results" / "followers"
 AGENTS = shipped()

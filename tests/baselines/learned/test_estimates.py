@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from baselines.calibration import NoiseModel
-from baselines.learned.estimates import BatchFilter
-from tracker.filters import AdaptiveKalmanFilter
+from baselines.followers.calibration import NoiseModel
+from tracker.estimators.batch import BatchFilter
+from tracker.estimators.filters import AdaptiveKalmanFilter
 
 NOISE = NoiseModel((0.04, 0.01), (0.05, 0.02), (0.1, 0.1))
 DT = 1.0 / 30.0

@@ -6,8 +6,8 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import DummyVecEnv
 
+from baselines.followers.networks import Network
 from baselines.learned.models import make_model, policy_arrays
-from baselines.learned.networks import Network
 from baselines.learned.recipes import PPORecipe, Recipe, RecurrentPPORecipe, SACRecipe
 
 SMALL = {"hidden": 16, "minibatch": 32}

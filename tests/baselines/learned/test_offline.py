@@ -6,8 +6,8 @@ import minari
 import numpy as np
 import pytest
 
-from baselines import cli
-from baselines.benchmark.assembly import cell_of, driver
+from baselines.benchmark.build import cell_of, driver
+from baselines.cli.main import main as cli
 
 
 @pytest.fixture(autouse=True)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from baselines.benchmark.store import InputError
+from baselines.followers.agents import load_agent
 from baselines.learned import training
-from baselines.learned.agents import load_agent
 from baselines.learned.recipes import RECIPES, Recipe
-from follow_env.env import FollowEnv
+from follow_env.envs.follow import FollowEnv
 
 SHORT = {
     "ppo": {"steps": 3000, "worlds": 24, "legs": 3, "rollout": 32, "minibatch": 256, "epochs": 2},

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tracker.detection.boxes import Detection, iou, nms, vote
+from tracker.boxes import Detection, iou, nms, vote
 
 
 def random_boxes(rng: np.random.Generator, count: int) -> np.ndarray:

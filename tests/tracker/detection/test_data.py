@@ -8,15 +8,15 @@ import cv2
 import numpy as np
 import pytest
 
+from baselines.learned.detector.augment import disturb, draw_backdrop
+from baselines.learned.detector.data import CAMERA, DataConfig, SampleSource, without_augmentation
+from baselines.learned.detector.preview import sheet
+from baselines.learned.detector.random_people import HARD_POSTURES, draw_posture
+from baselines.learned.detector.random_scenes import draw_room, draw_scene
 from follow_env.camera.pinhole import CameraPose
-from follow_env.person.walker import POSTURES
-from follow_env.scenes import SCENES
-from tracker.detection.boxes import iou
-from tracker.detection.data import CAMERA, DataConfig, SampleSource, without_augmentation
-from tracker.detection.looks import HARD_POSTURES, draw_posture
-from tracker.detection.photometry import disturb, draw_backdrop
-from tracker.detection.preview import sheet
-from tracker.detection.rooms import draw_room, draw_scene
+from follow_env.world.people.walker import POSTURES
+from follow_env.world.scenes import SCENES
+from tracker.boxes import iou
 
 SOURCE = SampleSource(7)
 SAMPLES = [SOURCE.sample(number) for number in range(24)]

@@ -8,7 +8,7 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
-from tracker.detection.boxes import iou
+from tracker.boxes import iou
 from tracker.detection.detector import AGREEMENT, PersonDetector, network_input, read
 from tracker.detection.networks import NETS, make_network
 from tracker.detection.priors import PAPER_LAYERS, encode, match, prior_boxes, to_corners

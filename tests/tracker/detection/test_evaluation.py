@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tracker.detection.boxes import Detection
-from tracker.detection.evaluation import Truth, assign, average_precision, score
+from baselines.learned.detector.evaluation import Truth, assign, average_precision, score
+from tracker.boxes import Detection
 
 LEFT, RIGHT = (0.1, 0.1, 0.3, 0.9), (0.6, 0.1, 0.8, 0.9)
 NEAR_LEFT = (0.11, 0.1, 0.31, 0.9)

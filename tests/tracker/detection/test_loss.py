@@ -5,7 +5,7 @@ import math
 import numpy as np
 import torch
 
-from tracker.detection.loss import NEGATIVES_PER_POSITIVE, multibox_loss
+from baselines.learned.detector.loss import NEGATIVES_PER_POSITIVE, multibox_loss
 from tracker.detection.priors import IGNORED, NEGATIVE, POSITIVE
 
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import torch
 
-from tracker.detection.data import SampleSource
+from baselines.learned.detector.data import SampleSource
+from baselines.learned.detector.loss import multibox_loss
+from baselines.learned.detector.training import choose_precision
 from tracker.detection.detector import network_input, to_tensor
-from tracker.detection.loss import multibox_loss
 from tracker.detection.networks import NETS, count_macs, count_parameters, make_network
 from tracker.detection.priors import match, prior_boxes
-from tracker.detection.training import choose_precision
 
 
 @pytest.mark.parametrize(("name", "priors"), [("light", 2252), ("light_depth", 2252), ("light_ssd", 8732)])

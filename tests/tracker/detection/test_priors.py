@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tracker.detection.boxes import iou
+from tracker.boxes import iou
 from tracker.detection.priors import (
     IGNORED,
     MATCH_OVERLAP,

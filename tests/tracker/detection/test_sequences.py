@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from follow_env.person.bodies import SUITS
-from follow_env.person.walker import POSTURES
-from tracker.detection.boxes import Detection
-from tracker.detection.sequences import TABLE_2, VIEWS, Sequence, count, play
+from baselines.papers.zhang2018.sequences import TABLE_2, VIEWS, Sequence, count, play
+from follow_env.world.people.bodies import SUITS
+from follow_env.world.people.walker import POSTURES
+from tracker.boxes import Detection
 
 SHORT = [Sequence(suit, view, 3 * len(POSTURES)) for suit in SUITS for view in range(1, 1 + len(VIEWS))]
 

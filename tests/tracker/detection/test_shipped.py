@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from tracker.detection.data import DataConfig, SampleSource, without_augmentation
+from baselines.learned.detector.data import DataConfig, SampleSource, without_augmentation
+from baselines.learned.detector.evaluation import evaluate
+from baselines.learned.detector.training import TEST_SEED
+from baselines.papers.zhang2018.sequences import TABLE_2, play
 from tracker.detection.detector import SHIPPED, PersonDetector, shipped_weights
-from tracker.detection.evaluation import evaluate
 from tracker.detection.networks import count_macs, count_parameters
-from tracker.detection.sequences import TABLE_2, play
-from tracker.detection.training import TEST_SEED
 
 ROWS = Path(__file__).parents[3] / "results" / "astronaut" / "table2_rows.csv"
 

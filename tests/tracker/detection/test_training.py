@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import torch
 
-from tracker.detection import training
+from baselines.learned.detector import training
+from baselines.learned.detector.training import TrainConfig, train
 from tracker.detection.detector import PersonDetector
-from tracker.detection.training import TrainConfig, train
 from tracker.detection.weights import load_network
 
 SHORT = TrainConfig(steps=4, batch=2, evaluate_every=2, test_pictures=2)

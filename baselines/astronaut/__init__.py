@@ -1,1 +1,0 @@
-"""Paper A's experiments, made again in the cabin."""

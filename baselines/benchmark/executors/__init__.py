@@ -1,0 +1,1 @@
+"""Where trials are played: in this process or in worker processes."""

@@ -1,0 +1,1 @@
+"""Who drives: followers, references and learned agents."""

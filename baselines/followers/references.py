@@ -1,0 +1,80 @@
+"""Floor and ceiling of every comparison: a parked robot, a random one, and one that knows the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from baselines.followers.calibration import Pair
+from baselines.followers.policy import Policy
+from follow_env.config import RobotConfig
+from follow_env.envs.task import SET_POINT
+from tracker.estimators.filters import Estimate
+
+
+@dataclass
+class NoState:
+    """The state of a policy that estimates nothing; `generator` is that of the random one."""
+
+    generator: np.random.Generator | None = None
+    measurement: Pair | None = None
+    estimate: Estimate | None = None
+
+
+class Parked:
+    """Never moves."""
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: np.ndarray | None = None, deterministic: bool = True
+    ) -> tuple[np.ndarray, NoState]:
+        """Return (zero action, state)."""
+        return np.zeros(2, np.float32), NoState()
+
+
+class Random:
+    """Draws each action uniformly from the action space, from a generator seeded by the episode's first observation."""
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: np.ndarray | None = None, deterministic: bool = True
+    ) -> tuple[np.ndarray, NoState]:
+        """Return (action, state)."""
+        if state is None or (episode_start is not None and bool(np.any(episode_start))):
+            seed = int.from_bytes(np.ascontiguousarray(observation).tobytes(), "little")
+            state = NoState(np.random.default_rng(seed))
+        return state.generator.uniform(-1.0, 1.0, 2).astype(np.float32), state
+
+
+class Oracle:
+    """Knows bearing, distance and the person's velocity (`state` observation), and has only the robot's limits.
+
+    Feedback linearisation of the relative motion: with the person at (d, y) in the robot frame moving at (a, b),
+    d' = a - v + omega y and y' = b - omega d, so v = a + omega y + k (d - SET_POINT) and omega = (b + k y) / d make
+    both errors decay at the rate k.
+
+    Args:
+        robot: of the environment; scales the action.
+        gain: k, 1/s.
+    """
+
+    def __init__(self, robot: RobotConfig | None = None, gain: float = 4.0) -> None:
+        self._robot, self._gain = robot or RobotConfig(), gain
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: np.ndarray | None = None, deterministic: bool = True
+    ) -> tuple[np.ndarray, NoState]:
+        """Return (action, state)."""
+        bearing, distance, ahead, left, *_ = observation.tolist()
+        d = max(distance, 0.3)
+        y = d * math.tan(min(max(bearing, -1.2), 1.2))
+        omega = (left + self._gain * y) / d
+        v = ahead + omega * y + self._gain * (distance - SET_POINT)
+        shares = (v / self._robot.max_speed, omega / self._robot.max_yaw_rate)
+        return np.array([min(max(share, -1.0), 1.0) for share in shares], np.float32), NoState()
+
+
+FLOORS: dict[str, Callable[[], Policy]] = {"parked": Parked, "random": Random, "oracle": Oracle}
+"""Name -> policy."""

@@ -1,0 +1,49 @@
+"""How the people of the training pictures look: bodies, clothes and postures by chance."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from baselines.learned.detector.random_scenes import draw_colour
+from follow_env.world.people.bodies import BODIES, OUTFITS, PATTERNS, SUITS, Outfit
+from follow_env.world.people.walker import POSTURES
+
+HARD_POSTURES = {"crouch": 2, "arms_raised": 2, "sideways": 2, "bent": 2, "floating": 4, "head_down": 3}
+"""How often these are drawn for every time that one of the others is."""
+
+
+class Look(NamedTuple):
+    """A body (one of `BODIES`), its level of detail, and its clothes."""
+
+    body: str
+    detail: str
+    outfit: Outfit
+
+
+def draw_look(rng: np.random.Generator) -> Look:
+    """Return any body in any clothes."""
+    name, detail = BODIES[rng.integers(len(BODIES))], "high" if rng.random() < 0.25 else "low"
+    named = [*OUTFITS.values(), *SUITS.values()]
+    outfit = named[rng.integers(len(named))] if rng.random() < 0.25 else _draw_outfit(rng)
+    return Look(name, detail, outfit)
+
+
+def draw_posture(rng: np.random.Generator) -> str:
+    """Return any posture, the hard ones more often."""
+    urn = [posture for posture in POSTURES for _ in range(HARD_POSTURES.get(posture, 1))]
+    return urn[rng.integers(len(urn))]
+
+
+def _draw_outfit(rng: np.random.Generator) -> Outfit:
+    """Return clothes of any colours; a fifth are overalls of one colour, as a spacesuit is."""
+    dark, light = np.array((0.22, 0.14, 0.10)), np.array((0.92, 0.75, 0.66))
+    red, green, blue = (dark + (light - dark) * rng.random()).tolist()
+    shirt = draw_colour(rng)
+    return Outfit(
+        skin=(red, green, blue),
+        hair=draw_colour(rng, 0.6),
+        shirt=shirt,
+        trousers=shirt if rng.random() < 0.2 else draw_colour(rng, 0.7),
+        shoes=draw_colour(rng, 0.7),
+        pattern="plain" if rng.random() < 0.6 else PATTERNS[rng.integers(len(PATTERNS))],
+    )

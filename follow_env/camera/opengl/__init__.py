@@ -1,0 +1,1 @@
+"""The same pictures from a graphics chip."""

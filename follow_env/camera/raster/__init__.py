@@ -1,0 +1,1 @@
+"""The software renderer: compiled kernels over tiles."""

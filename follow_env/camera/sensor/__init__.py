@@ -1,0 +1,1 @@
+"""What the RGB-D sensor makes of a rendered picture."""

@@ -1,0 +1,1 @@
+"""The Gymnasium environments: they compose the world, the camera and the sensors."""

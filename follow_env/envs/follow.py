@@ -1,0 +1,443 @@
+"""`FollowEnv`: composes world, person, camera and sensors; owns the clock and the one random generator."""
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from follow_env.camera import RENDERERS, CameraPose, PinholeCamera, Renderer, RGBDFrame, make_renderer
+from follow_env.camera.measurement import MeasurementModel
+from follow_env.config import CameraConfig, RobotConfig, SensorConfig, build, choose, sensor_config
+from follow_env.envs.dashboard import Dashboard, import_pygame, show_window
+from follow_env.envs.observations import MAX_DISTANCE, OBSERVATIONS, observation_space
+from follow_env.envs.task import (
+    BAND_BEARING,
+    BAND_DISTANCE,
+    SET_POINT,
+    SUCCESS_BAND_SHARE,
+    SUCCESS_OUT_OF_VIEW,
+    reward_terms,
+)
+from follow_env.world.bullet import PERSON_RADIUS, PHYSICS_HZ, World
+from follow_env.world.motion.routes import PAPER_SPEED, Route, check_walking_speed, choose_route, make_route
+from follow_env.world.people.bodies import BODIES, OUTFITS, load_body
+from follow_env.world.people.mesh import Placed
+from follow_env.world.people.walker import Walker
+from follow_env.world.scenes import make_scene
+
+if TYPE_CHECKING:
+    from follow_env.camera.sensor.sensing import RGBDSensing
+
+ACTIONS = ("twist", "wheels")
+SETTINGS = (
+    *("scene", "obs", "action", "route", "sensor", "camera", "robot", "renderer", "light", "control_hz", "latency_s"),
+    *("person", "outfit", "walking_speed", "render_mode"),
+)
+LOST_AFTER = 5.0
+"""The episode ends when the person was out of view for longer than this, s."""
+HALF_TRUNK = 0.16
+"""The person counts as visible while any of the trunk, this far to either side of its axis, is in view, m."""
+
+
+class FollowEnv(gymnasium.Env):
+    """A differential-drive robot with an RGB-D camera follows a walking person.
+
+    Frames are REP-103: robot x forward, y left, origin at the axle's middle; bearing positive to the left. `bearing`
+    (rad) and `distance` (m, along x) are those of the person's pelvis axis.
+
+    **Action** `Box(-1, 1, (2,))`: `action="twist"` is (v, omega) as shares of the robot's `max_speed` and
+    `max_yaw_rate`; `"wheels"` is (left, right) as shares of `max_wheel_speed`. Larger values are clipped.
+
+    **Observation** by `obs`:
+
+    - `"measurement"` float32 (8,): bearing, distance, validity (1 or 0), age of the latest measurement in s, odometry
+      v and omega, last action. Without a new measurement bearing, distance and validity are 0, and the age counts on
+      from the latest one (from the start while there was none).
+    - `"state"` float32 (8,): true bearing, true distance, person's velocity in the robot frame (x, y), odometry v and
+      omega, last action.
+    - `"rgbd"` Dict: `rgb` uint8 (H, W, 3), `depth` float32 (H, W) m (0 = no reading), `twist` float32 (2,) odometry.
+    - `"rgbd_box"`: the same and `box` float32 (4,) = (u0, v0, u1, v1) px, the person's visible box with the stated
+      jitter; zeros when the person is not detected. The `mask` rung of the benchmark.
+    - `"rgbd_uint8"`: uint8 (H, W, 4), the depth as 255 (1 - z / 8 m), 0 = no reading or beyond; the metric depth
+      stays in `info["depth"]`.
+
+    With pictures, `info["frame_time"]` (s) is when the observed one was taken. When a frame is dropped, the one before
+    stands with its time, without a box; so does the first one, with latency, until it is old enough.
+
+    **Reward**: sum of the bounded terms in `info["rewards"]` (`follow_env.envs.task`).
+
+    **Ends**: a collision or a person out of view for more than 5 s terminates; the route's end truncates.
+
+    Args:
+        scene: `"corridor"`, `"indoor"` or `"cabin"` (8 m long: with `route="standing"` only).
+        obs: see above.
+        action: `"twist"` or `"wheels"`.
+        route: `"paper"` (12 m in 14 s, turns up to 50 deg), `"straight"` or `"standing"`.
+        sensor: `"xtion"`, `"xtion_harsh"`, `"ideal"` or a mapping of `SensorConfig` settings that differ from those
+            of `"xtion"`, or of its entry `preset`: `{"preset": "ideal", "measurement": {"miss_share": 0.1}}`.
+        camera: mapping of `CameraConfig` settings, e.g. `{"width": 320, "height": 240}`.
+        robot: mapping of `RobotConfig` settings.
+        renderer: `"raster"` (ours), `"opengl"` (the same picture from a graphics chip; needs the extra `gl`) or
+            `"tiny"` (PyBullet's, slow, a cross-check: the person keeps the posture of the episode's first picture).
+        light: `"normal"`, `"dim"` (an evening: 15 % of it) or `"uneven"` (every other lamp all but off).
+        control_hz: control and camera rate; divides 240.
+        latency_s: age of what is observed, s; a multiple of the control period.
+        person: body of the person, one of `follow_env.world.people.bodies.BODIES`.
+        outfit: what the person wears, a key of `follow_env.world.people.bodies.OUTFITS`.
+        walking_speed: of the person between starting and stopping, m/s, from 0.2 to 2. The path stays; its times, the
+            14 s of the episode among them, stretch by 0.923 m/s over the speed.
+        render_mode: None, `"rgb_array"` (dashboard), `"rgbd_tuple"` ((rgb, depth) of the robot) or `"human"`.
+
+    Raises:
+        ValueError: for an unknown name or an impossible value, in one sentence.
+    """
+
+    metadata = {"render_modes": ["rgb_array", "rgbd_tuple", "human"], "render_fps": 30, "engine": "pybullet"}  # noqa: RUF012
+
+    def __init__(
+        self,
+        scene: str = "corridor",
+        obs: str = "measurement",
+        action: str = "twist",
+        route: str = "paper",
+        sensor: str | Mapping[str, Any] | SensorConfig = "xtion",
+        camera: Mapping[str, Any] | None = None,
+        robot: Mapping[str, Any] | None = None,
+        renderer: str = "raster",
+        light: str = "normal",
+        control_hz: int = 30,
+        latency_s: float = 0.0,
+        person: str = "man",
+        outfit: str = "blue",
+        walking_speed: float = PAPER_SPEED,
+        render_mode: str | None = None,
+        **unknown: Any,
+    ) -> None:
+        for name in unknown:
+            choose("FollowEnv setting", name, SETTINGS)
+        if type(control_hz) is not int or control_hz <= 0 or PHYSICS_HZ % control_hz:
+            raise ValueError(
+                f"control_hz is {control_hz!r}; expected a whole number that divides the physics rate {PHYSICS_HZ}, "
+                "for example 30"
+            )
+        self._obs = choose("obs", obs, OBSERVATIONS)
+        self._action = choose("action", action, ACTIONS)
+        self._renderer_name = choose("renderer", renderer, RENDERERS)
+        self._person, self._outfit = choose("person", person, BODIES), choose("outfit", outfit, OUTFITS)
+        self.render_mode = (
+            None if render_mode is None else choose("render_mode", render_mode, self.metadata["render_modes"])
+        )
+        if self.render_mode == "human":
+            import_pygame()
+        self.dt = 1.0 / control_hz
+        self.metadata = {**self.metadata, "render_fps": control_hz}
+        self._substeps = PHYSICS_HZ // control_hz
+        numeric = isinstance(latency_s, int | float) and math.isfinite(latency_s)
+        self._delay = round(latency_s * control_hz) if numeric else -1
+        if self._delay < 0 or abs(self._delay * self.dt - latency_s) > 1e-6:
+            raise ValueError(
+                f"latency_s is {latency_s!r}; expected a multiple >= 0 of the control period {self.dt:.4f} s"
+            )
+        self.robot_config = build("robot", RobotConfig(), robot)
+        self.camera = PinholeCamera(build("camera", CameraConfig(), camera))
+        self._half_field = math.tan(0.5 * self.camera.hfov)
+        self._sensor = sensor_config(sensor)
+        self.scene = make_scene(scene, light)
+        self._route_name = choose_route(route, self.scene)
+        self._walking_speed = check_walking_speed(walking_speed)
+        self._world: World | None = None
+        self._renderer: Renderer | None = None
+        self._dashboard: Dashboard | None = None
+        self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self.observation_space = observation_space(self._obs, self.camera, self.robot_config)
+        self._route: Route | None = None
+        self.observed: RGBDFrame | None = None
+        self._sensing: RGBDSensing | None = None
+        self._dressed = (self._person, self._outfit)
+        self._walker: Walker | None = None
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Start an episode.
+
+        Args:
+            seed: seeds the environment's generator; one seed gives one episode, bit for bit.
+            options: `route` (name), `robot_pose` ((x, y, yaw), m and rad), `person` (body), `outfit`, `sensor`,
+                `walking_speed` (m/s): for this episode only.
+        """
+        super().reset(seed=seed)
+        options = options or {}
+        for key in options:
+            choose("reset option", key, ("route", "robot_pose", "person", "outfit", "sensor", "walking_speed"))
+        if self._world is None:
+            self._world = World(self.scene, self.robot_config)
+        self._set_up_sensors(sensor_config(options["sensor"]) if "sensor" in options else self._sensor)
+        body = choose("person", options.get("person", self._person), BODIES)
+        outfit = choose("outfit", options.get("outfit", self._outfit), OUTFITS)
+        if self._dressed != (body, outfit):
+            self._dressed, self._walker = (body, outfit), None
+        if self._renderer_name == "tiny" and self._renderer is not None:
+            self._renderer.close()  # its rigid people keep the posture of the last episode
+            self._renderer = None
+
+        x, y, yaw = self.scene.start
+        y += float(self.np_random.uniform(-1.0, 1.0)) * self.scene.start_width
+        ahead = (x + SET_POINT * math.cos(yaw), y + SET_POINT * math.sin(yaw), yaw)
+        route = choose_route(options["route"], self.scene) if "route" in options else self._route_name
+        speed = check_walking_speed(options.get("walking_speed", self._walking_speed))
+        self._route = make_route(route, self.scene, ahead, self.np_random, speed)
+        robot_pose = _pose(options.get("robot_pose", (x, y, yaw)))
+        self._steps = 0
+        self._person_pose = self._route.pose(self.time)
+        self._world.reset(robot_pose, self._person_pose)
+
+        self._twist = (0.0, 0.0)
+        self._last_action: np.ndarray = np.zeros(2, np.float32)
+        self._out_of_view = self._longest_out_of_view = 0
+        self._in_band = 0
+        self._last_measured: float | None = None
+        if self._dashboard is not None:
+            self._dashboard.reset()
+        self._look()
+        self._rewards = dict.fromkeys(reward_terms(0.0, SET_POINT, True, 0.0, False), 0.0)
+        self._saturated = False
+        self._collision = "none"
+        observation = self._observe()
+        info = self._info()
+        self._show(info)
+        return observation, info
+
+    def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Drive for one control period; see the class for action, observation, reward and ends."""
+        if self._route is None or self._world is None:
+            raise gymnasium.error.ResetNeeded("step() was called before reset(); call reset() first")
+        command = np.asarray(action, np.float64)
+        if command.shape != (2,):
+            raise ValueError(f"the action has shape {command.shape}; expected (2,): {self._action} in [-1, 1]")
+        first, second = float(command[0]), float(command[1])
+        if not (math.isfinite(first) and math.isfinite(second)):
+            raise ValueError(f"the action is {[first, second]}; expected two finite numbers in [-1, 1]")
+        first, second = min(max(first, -1.0), 1.0), min(max(second, -1.0), 1.0)
+        robot = self.robot_config
+        if self._action == "twist":
+            wheels = self._world.drive.wheels(first * robot.max_speed, second * robot.max_yaw_rate)
+        else:
+            wheels = first * robot.max_wheel_speed, second * robot.max_wheel_speed
+
+        self._steps += 1
+        self._person_pose = self._route.pose(self.time)
+        self._world.place_person(self._person_pose)
+        self._twist = self._world.step(*wheels, self._substeps)
+        left, right = self._world.wheel_command
+        self._saturated = max(abs(left - wheels[0]), abs(right - wheels[1])) > 1e-9
+        self._collision = self._world.collision()
+        self._look()
+        effort = max(abs(first - float(self._last_action[0])), abs(second - float(self._last_action[1])))
+        self._last_action = np.array((first, second), np.float32)
+        collided = self._collision != "none"
+        self._rewards = reward_terms(self._bearing, self._distance, self._visible, effort, collided)
+        terminated = collided or self._out_of_view * self.dt > LOST_AFTER
+        truncated = not terminated and self.time >= self._route.duration - 1e-9
+        observation = self._observe()
+        info = self._info()
+        self._show(info)
+        return observation, sum(self._rewards.values()), terminated, truncated, info
+
+    def render(self) -> Any:
+        """Return the dashboard (H, W, 3) uint8, or the robot's (rgb, depth), or None in `human` mode."""
+        if self.render_mode is None or self._route is None:
+            raise gymnasium.error.ResetNeeded(
+                "nothing to render; make the environment with render_mode='rgb_array' and call reset() first"
+            )
+        if self.render_mode == "rgbd_tuple":
+            frame = self.frame()
+            return frame.rgb, frame.depth
+        if self.render_mode == "human":
+            return None
+        assert self._dashboard is not None
+        return self._dashboard.image()
+
+    def frame(self) -> RGBDFrame:
+        """Return the camera's picture of this moment without sensor errors: the truth, for pictures and tests."""
+        if self._route is None:
+            raise gymnasium.error.ResetNeeded("frame() was called before reset(); call reset() first")
+        assert self._world is not None
+        if self._renderer is None:
+            self._renderer = make_renderer(self._renderer_name, self.scene, self.camera)
+        return self._renderer.render(self.camera_pose(), self.people())
+
+    def people(self) -> tuple[Placed, ...]:
+        """Return the people as they stand at this moment, for another camera to draw."""
+        if self._route is None:
+            raise gymnasium.error.ResetNeeded("people() was called before reset(); call reset() first")
+        if self._walker is None:
+            self._walker = Walker(load_body(*self._dressed))
+        t = self.time
+        return (self._walker.place(*self._route.pose(t), self._route.walked(t), self._route.speed(t)),)
+
+    def camera_pose(self) -> CameraPose:
+        """Pose of the camera in the world frame."""
+        x, y, yaw = self._robot_pose
+        forward = self.robot_config.camera_forward
+        return CameraPose(
+            x + forward * math.cos(yaw), y + forward * math.sin(yaw), self.robot_config.camera_height, yaw
+        )
+
+    @property
+    def time(self) -> float:
+        """Seconds since the episode's start."""
+        return self._steps * self.dt
+
+    def close(self) -> None:
+        """Free the physics and the renderer; a second call does nothing."""
+        for part in (self._world, self._renderer):
+            if part is not None:
+                part.close()
+        self._world = self._renderer = self._route = None
+
+    def _set_up_sensors(self, sensor: SensorConfig) -> None:
+        self._measurement = MeasurementModel(sensor.measurement, self.dt)
+        self._queue: deque[Any] = deque()
+        if not self._obs.startswith("rgbd"):
+            return
+        if self._sensing is None or self._sensing.config != sensor:
+            from follow_env.camera.sensor.sensing import RGBDSensing  # compiled: only for those who look at pictures
+
+            self._sensing = RGBDSensing(sensor, self.camera, self.dt, boxes=self._obs == "rgbd_box")
+        self._sensing.restart()
+
+    def _look(self) -> None:
+        """Update the truth: poses, bearing, distance, visibility and what is counted from them."""
+        assert self._route is not None
+        assert self._world is not None
+        self._robot_pose = self._world.robot_pose()
+        self._person_velocity = self._route.velocity(self.time)
+        x, y, yaw = self._robot_pose
+        dx, dy = self._person_pose[0] - x, self._person_pose[1] - y
+        cosine, sine = math.cos(yaw), math.sin(yaw)
+        self._distance, left = cosine * dx + sine * dy, -sine * dx + cosine * dy
+        self._bearing = math.atan2(left, self._distance)
+        self._surface_distance = max(math.sqrt(dx * dx + dy * dy) - self.robot_config.hull_radius - PERSON_RADIUS, 0.0)
+        self._visible = self._in_view(self._distance - self.robot_config.camera_forward, left, cosine, sine)
+        self._out_of_view = 0 if self._visible else self._out_of_view + 1
+        self._longest_out_of_view = max(self._longest_out_of_view, self._out_of_view)
+        low, high = BAND_DISTANCE
+        self._in_band += low <= self._distance <= high and abs(self._bearing) <= BAND_BEARING
+
+    def _in_view(self, depth: float, left: float, cosine: float, sine: float) -> bool:
+        """Whether any of the trunk (axis, left or right side) is in the camera's field with a free line of sight.
+
+        Args:
+            depth: of the person ahead of the camera, m.
+            left: of the person to the left of the optical axis, m.
+            cosine: of the robot's yaw.
+            sine: of the robot's yaw.
+        """
+        assert self._world is not None
+        if depth <= 0.3:
+            return False
+        reach = depth * self._half_field
+        eye = self.camera_pose()
+        x, y, _ = self._person_pose
+        for offset in (0.0, HALF_TRUNK, -HALF_TRUNK):
+            if abs(left + offset) <= reach:
+                point = (x - offset * sine, y + offset * cosine, 1.2)
+                if self._world.line_of_sight((eye.x, eye.y, eye.z), point):
+                    return True
+        return False
+
+    def _observe(self) -> Any:
+        """Return the observation, `latency_s` old in what was seen, current in odometry and action."""
+        own = (*self._twist, *(float(a) for a in self._last_action))
+        if self._obs == "state":
+            yaw = self._robot_pose[2]
+            (vx, vy), cosine, sine = self._person_velocity, math.cos(yaw), math.sin(yaw)
+            return np.array(
+                (self._bearing, self._distance, cosine * vx + sine * vy, cosine * vy - sine * vx, *own), np.float32
+            )
+        if self._obs == "measurement":
+            seen = self._delayed(
+                self._measurement.measure(self._bearing, self._distance, self._visible, self.np_random)
+            )
+            if seen is None:
+                since = 0.0 if self._last_measured is None else self._last_measured
+                return np.array((0.0, 0.0, 0.0, self.time - since, *own), np.float32)
+            age = self._delay * self.dt
+            self._last_measured = self.time - age
+            bearing = min(max(seen[0], -math.pi), math.pi)
+            return np.array((bearing, min(seen[1], MAX_DISTANCE), 1.0, age, *own), np.float32)
+        assert self._sensing is not None
+        seen = self._delayed(self._sensing.sense(self.frame, self.time, self.np_random))
+        if seen is None:
+            first, _, taken = self._queue[0]
+            seen = first, np.zeros(4, np.float32), taken
+        self.observed, box, self._frame_time = seen
+        if self._obs == "rgbd_uint8":
+            from follow_env.camera.sensor.errors import packed
+
+            return packed(self.observed.rgb, self.observed.depth)
+        twist = np.array(self._twist, np.float32)
+        observation = {"rgb": self.observed.rgb, "depth": self.observed.depth, "twist": twist}
+        if self._obs == "rgbd_box":
+            observation["box"] = box
+        return observation
+
+    def _delayed(self, value: Any) -> Any:
+        """Return what was seen `latency_s` ago, or None while that was before the start."""
+        self._queue.append(value)
+        return self._queue.popleft() if len(self._queue) > self._delay else None
+
+    def _info(self) -> dict[str, Any]:
+        assert self._world is not None
+        steps = self._steps + 1
+        success = (
+            self._collision == "none"
+            and self._longest_out_of_view * self.dt <= SUCCESS_OUT_OF_VIEW + 1e-9
+            and self._in_band >= SUCCESS_BAND_SHARE * steps
+        )
+        info = {
+            "time": self.time,
+            "bearing": self._bearing,
+            "distance": self._distance,
+            "visible": self._visible,
+            "collision": self._collision != "none",
+            "collision_with": self._collision,
+            "surface_distance": self._surface_distance,
+            "robot_pose": np.array(self._robot_pose),
+            "person_pose": np.array(self._person_pose),
+            "person_velocity": np.array(self._person_velocity),
+            "twist": np.array(self._twist),
+            "command": np.array(self._world.command),
+            "saturated": self._saturated,
+            "rewards": dict(self._rewards),
+            "is_success": success,
+        }
+        if self._obs.startswith("rgbd"):
+            info["frame_time"] = self._frame_time
+        if self._obs == "rgbd_uint8":
+            assert self.observed is not None
+            info["depth"] = self.observed.depth
+        return info
+
+    def _show(self, info: dict[str, Any]) -> None:
+        """Feed the dashboard when somebody looks; open or refresh the window in `human` mode."""
+        if self.render_mode not in ("rgb_array", "human"):
+            return
+        if self._dashboard is None:
+            self._dashboard = Dashboard(self.scene, self.camera, self.robot_config.camera_forward)
+        self._dashboard.update(info, self.observed or self.frame())
+        if self.render_mode == "human":
+            show_window(self._dashboard.image(), 1.0 / self.dt)
+
+
+def _pose(value: Any) -> tuple[float, float, float]:
+    try:
+        x, y, yaw = (float(number) for number in value)
+    except (TypeError, ValueError):
+        x = y = yaw = math.nan
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):
+        raise ValueError(f"robot_pose is {value!r}; expected three finite numbers (x, y, yaw)")
+    return x, y, yaw

@@ -1,0 +1,1 @@
+"""Compiled episodes of many worlds at once, and their pictures."""

@@ -1,1 +1,0 @@
-"""The kinematic engine of `FollowVectorEnv`: worlds as records, compiled by numba."""

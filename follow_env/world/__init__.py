@@ -1,0 +1,1 @@
+"""The world without Gymnasium: scenes, people and how they move, robots, and the physics."""

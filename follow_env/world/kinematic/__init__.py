@@ -1,0 +1,1 @@
+"""The compiled world of many episodes: places, robots and routes in records."""

@@ -1,0 +1,229 @@
+# mypy: disable-error-code="no-untyped-def"
+"""The place seen from above: how far the next obstacle is, what the robot touches, what hides the person.
+
+A grid holds the distance from each cell's centre to the next obstacle. The distance at a point differs from it by the
+way to the centre at most, which settles nearly every question; the rest is computed exactly.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from follow_env.world.bullet import PERSON_HEIGHT, PERSON_RADIUS
+from follow_env.world.scene import Box, Scene
+
+CELL = 0.1
+"""Size of the grid's cells, m."""
+
+# The robot's parts as `follow_env.world.bullet` builds them, seen from the axle's middle, m.
+CHASSIS_MIDDLE, CHASSIS_LENGTH, CHASSIS_WIDTH = -0.05, 0.15, 0.11  # half sizes
+CHASSIS_LOW, CHASSIS_HIGH = 0.05, 0.15
+CASTER_MIDDLE, CASTER_RADIUS = -0.18, 0.03
+MAST_MIDDLE, MAST_RADIUS, MAST_LOW, MAST_HIGH = -0.07, 0.03, 0.16, 0.96
+PERSON_LOW = 0.5 * PERSON_HEIGHT - 0.5 * (PERSON_HEIGHT - 2.0 * PERSON_RADIUS - 0.02)
+"""Height of the centre of the lower half-sphere of the person's capsule, m."""
+FURTHEST = 0.24
+"""All parts but the wheels lie in a circle of this radius around the axle's middle, m."""
+
+OBSTACLE = np.dtype(
+    [(name, np.float64) for name in ("x", "y", "length", "width", "cosine", "sine", "radius")]
+    + [(name, np.float64) for name in ("low", "high", "reach")]
+)
+"""An upright prism: a rectangle (half sizes) grown by `radius`, between two heights, within `reach` of (x, y); m."""
+
+
+class Place(NamedTuple):
+    """Obstacles of a scene, and grids (columns, rows) of the distance from cell centres to the next of them.
+
+    `sight` are the obstacles between the camera's height and that of the person's chest.
+    """
+
+    obstacles: np.ndarray
+    sight: np.ndarray
+    distance: np.ndarray
+    sight_distance: np.ndarray
+    x0: float
+    y0: float
+
+
+def pack_place(scene: Scene, camera_height: float, chest_height: float) -> Place:
+    """Return the obstacles of `scene` for a camera at `camera_height` (m) that looks at `chest_height` (m)."""
+    rows = []
+    for p in scene.obstacles():
+        if isinstance(p, Box):
+            length, width, radius, yaw = 0.5 * p.size[0], 0.5 * p.size[1], 0.0, p.yaw
+        else:
+            length, width, radius, yaw = 0.0, 0.0, p.radius, 0.0
+        reach = math.sqrt(length * length + width * width) + radius
+        x, y, z = p.centre
+        footprint = (x, y, length, width, math.cos(yaw), math.sin(yaw), radius)
+        rows.append((*footprint, p.bottom, 2.0 * z - p.bottom, reach))
+    obstacles = np.array(rows, OBSTACLE)
+    low, high = sorted((camera_height, chest_height))
+    sight = obstacles[(obstacles["low"] <= high) & (obstacles["high"] >= low)]
+    x_min, x_max, y_min, y_max = scene.bounds
+    columns, rows_ = math.ceil((x_max - x_min) / CELL), math.ceil((y_max - y_min) / CELL)
+    grids = [_grid(group, x_min, y_min, columns, rows_) for group in (obstacles, sight)]
+    return Place(obstacles, sight, grids[0], grids[1], x_min, y_min)
+
+
+_jit = njit(nogil=True, error_model="numpy", forceinline=True)
+
+
+@_jit
+def gap(obstacle, x, y):
+    """Return the horizontal distance from a point to an obstacle, m; 0 inside."""
+    dx, dy = x - obstacle.x, y - obstacle.y
+    along = max(abs(dx * obstacle.cosine + dy * obstacle.sine) - obstacle.length, 0.0)
+    across = max(abs(dy * obstacle.cosine - dx * obstacle.sine) - obstacle.width, 0.0)
+    return max(math.sqrt(along * along + across * across) - obstacle.radius, 0.0)
+
+
+@njit(cache=True, nogil=True)
+def _grid(obstacles, x0, y0, columns, rows):
+    distance = np.full((columns, rows), np.inf)
+    for i in range(columns):
+        for j in range(rows):
+            for k in range(len(obstacles)):
+                distance[i, j] = min(distance[i, j], gap(obstacles[k], x0 + (i + 0.5) * CELL, y0 + (j + 0.5) * CELL))
+    return distance
+
+
+@_jit
+def _bounds(distance, place, x, y):
+    """Return the least and the largest distance that the next obstacle of a grid can have from a point, m."""
+    i = min(max(int((x - place.x0) / CELL), 0), distance.shape[0] - 1)
+    j = min(max(int((y - place.y0) / CELL), 0), distance.shape[1] - 1)
+    dx, dy = x - (place.x0 + (i + 0.5) * CELL), y - (place.y0 + (j + 0.5) * CELL)
+    off = math.sqrt(dx * dx + dy * dy)
+    return distance[i, j] - off, distance[i, j] + off
+
+
+@_jit
+def nearer_than(place, x, y, radius):
+    """Whether any obstacle is nearer than `radius` to the point."""
+    least, most = _bounds(place.distance, place, x, y)
+    if least >= radius or most < radius:
+        return most < radius
+    for k in range(len(place.obstacles)):  # noqa: SIM110  numba inlines no generators
+        if gap(place.obstacles[k], x, y) < radius:
+            return True
+    return False
+
+
+@_jit
+def touches_place(place, x, y, cosine, sine, wheel_radius, half_track):
+    """Whether the level robot overlaps an obstacle: chassis, two wheels, caster and mast, each exactly."""
+    furthest = max(FURTHEST, half_track + wheel_radius)
+    if _bounds(place.distance, place, x, y)[0] > furthest:
+        return False
+    for k in range(len(place.obstacles)):
+        o = place.obstacles[k]
+        dx, dy = o.x - x, o.y - y
+        if dx * dx + dy * dy > (o.reach + furthest) ** 2:
+            continue
+        for side in (-half_track, half_track):
+            if gap(o, x - side * sine, y + side * cosine) < _ball(wheel_radius, o.low, o.high):
+                return True
+        if gap(o, x + CASTER_MIDDLE * cosine, y + CASTER_MIDDLE * sine) < _ball(CASTER_RADIUS, o.low, o.high):
+            return True
+        beside_mast = o.low < MAST_HIGH and o.high > MAST_LOW
+        if beside_mast and gap(o, x + MAST_MIDDLE * cosine, y + MAST_MIDDLE * sine) < MAST_RADIUS:
+            return True
+        if o.low < CHASSIS_HIGH and o.high > CHASSIS_LOW and _chassis_overlaps(o, x, y, cosine, sine):
+            return True
+    return False
+
+
+@_jit
+def _ball(radius, low, high):
+    """Return how near a ball that lies on the floor may come to a wall between two heights; 0 if it fits under."""
+    off = max(low - radius, radius - high, 0.0)
+    return math.sqrt(max(radius * radius - off * off, 0.0))
+
+
+@_jit
+def _chassis_overlaps(o, x, y, cosine, sine):
+    """Whether the chassis' rectangle overlaps an obstacle's footprint (separating axes; a disc by its distance)."""
+    dx, dy = o.x - (x + CHASSIS_MIDDLE * cosine), o.y - (y + CHASSIS_MIDDLE * sine)
+    along, across = abs(dx * cosine + dy * sine), abs(dy * cosine - dx * sine)
+    if o.radius > 0.0:
+        along, across = max(along - CHASSIS_LENGTH, 0.0), max(across - CHASSIS_WIDTH, 0.0)
+        return along * along + across * across < o.radius * o.radius
+    c, s = abs(cosine * o.cosine + sine * o.sine), abs(sine * o.cosine - cosine * o.sine)
+    if along > CHASSIS_LENGTH + o.length * c + o.width * s or across > CHASSIS_WIDTH + o.length * s + o.width * c:
+        return False
+    along, across = abs(dx * o.cosine + dy * o.sine), abs(dy * o.cosine - dx * o.sine)
+    return (
+        along <= o.length + CHASSIS_LENGTH * c + CHASSIS_WIDTH * s
+        and across <= o.width + CHASSIS_LENGTH * s + CHASSIS_WIDTH * c
+    )
+
+
+@_jit
+def touches_person(x, y, cosine, sine, person_x, person_y, wheel_radius, half_track):
+    """Whether the level robot overlaps the person's capsule."""
+    dx, dy = person_x - x, person_y - y
+    along, across = dx * cosine + dy * sine, dy * cosine - dx * sine
+    if along * along + across * across > (max(FURTHEST, half_track + wheel_radius) + PERSON_RADIUS) ** 2:
+        return False
+    for middle, offset, radius in (
+        (0.0, half_track, wheel_radius),
+        (0.0, -half_track, wheel_radius),
+        (CASTER_MIDDLE, 0.0, CASTER_RADIUS),
+    ):
+        rise = max(PERSON_LOW - radius, 0.0)
+        if (along - middle) ** 2 + (across - offset) ** 2 + rise * rise < (PERSON_RADIUS + radius) ** 2:
+            return True
+    if (along - MAST_MIDDLE) ** 2 + across * across < (PERSON_RADIUS + MAST_RADIUS) ** 2:
+        return True
+    rise = PERSON_LOW - CHASSIS_HIGH
+    beyond = max(abs(along - CHASSIS_MIDDLE) - CHASSIS_LENGTH, 0.0), max(abs(across) - CHASSIS_WIDTH, 0.0)
+    return beyond[0] ** 2 + beyond[1] ** 2 + rise * rise < PERSON_RADIUS * PERSON_RADIUS
+
+
+@_jit
+def free_sight(place, x, y, z, to_x, to_y, to_z):
+    """Whether no obstacle meets the straight line between two points."""
+    dx, dy, dz = to_x - x, to_y - y, to_z - z
+    length = math.sqrt(dx * dx + dy * dy)
+    if _bounds(place.sight_distance, place, x + 0.5 * dx, y + 0.5 * dy)[0] > 0.5 * length:
+        return True
+    for k in range(len(place.sight)):
+        o = place.sight[k]
+        mx, my = x + 0.5 * dx - o.x, y + 0.5 * dy - o.y
+        if mx * mx + my * my < (o.reach + 0.5 * length) ** 2 and _meets(o, x, y, z, dx, dy, dz):
+            return False
+    return True
+
+
+@_jit
+def _meets(o, x, y, z, dx, dy, dz):
+    """Whether the line from (x, y, z) to its end (dx, dy, dz) further on enters an obstacle.
+
+    A line that begins inside does not enter, as in PyBullet's `rayTest`.
+    """
+    first, last = _slab(z - 0.5 * (o.low + o.high), dz, 0.5 * (o.high - o.low), -math.inf, 1.0)
+    ox, oy = x - o.x, y - o.y
+    if o.radius > 0.0:
+        a, b, c = dx * dx + dy * dy, ox * dx + oy * dy, ox * ox + oy * oy - o.radius * o.radius
+        root = b * b - a * c
+        if root <= 0.0 or a == 0.0:
+            return False
+        root = math.sqrt(root)
+        first, last = max(first, (-b - root) / a), min(last, (-b + root) / a)
+        return 0.0 <= first < last
+    first, last = _slab(ox * o.cosine + oy * o.sine, dx * o.cosine + dy * o.sine, o.length, first, last)
+    first, last = _slab(oy * o.cosine - ox * o.sine, dy * o.cosine - dx * o.sine, o.width, first, last)
+    return 0.0 <= first < last
+
+
+@_jit
+def _slab(start, way, half, first, last):
+    """Return the part of the line's [first, last] within -half..half on one axis; empty if first >= last."""
+    if abs(way) < 1e-12:
+        return (first, last) if abs(start) < half else (1.0, 0.0)
+    one, other = (-half - start) / way, (half - start) / way
+    return max(first, min(one, other)), min(last, max(one, other))

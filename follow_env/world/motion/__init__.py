@@ -1,0 +1,1 @@
+"""How people move: paths with a speed profile."""

@@ -1,0 +1,1 @@
+"""Robots: kinematics, limits and geometry."""

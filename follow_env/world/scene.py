@@ -1,0 +1,217 @@
+"""`Scene`: the immutable geometry of a place. The one source for physics and cameras.
+
+World frame: x along the scene's main direction, y left, z up, floor at z = 0, metres.
+"""
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+CELL = 0.2
+"""Side of the cells of a scene's table of clearances, m."""
+CELL_REACH = 0.15
+"""The clearance differs by less than this within half a cell's diagonal, m."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """A surface: colour as sRGB in [0, 1], a specular share in [0, 1] and a texture.
+
+    The textures are named in `camera.raster.textures.TEXTURES`; a renderer without them draws the plain colour.
+    """
+
+    colour: tuple[float, float, float]
+    specular: float = 0.1
+    texture: str = "plain"
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box: centre (m), full size (m), yaw about z (rad). `solid=False` is decoration without collision."""
+
+    centre: tuple[float, float, float]
+    size: tuple[float, float, float]
+    material: Material
+    yaw: float = 0.0
+    solid: bool = True
+
+    def __post_init__(self) -> None:
+        _check(self, (*self.centre, self.yaw), self.size)
+
+    @property
+    def bottom(self) -> float:
+        """Height of the lowest point, m."""
+        return self.centre[2] - 0.5 * self.size[2]
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """An upright cylinder: centre (m), radius (m), height (m)."""
+
+    centre: tuple[float, float, float]
+    radius: float
+    height: float
+    material: Material
+    solid: bool = True
+
+    def __post_init__(self) -> None:
+        _check(self, self.centre, (self.radius, self.height))
+
+    @property
+    def bottom(self) -> float:
+        """Height of the lowest point, m."""
+        return self.centre[2] - 0.5 * self.height
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A sphere: centre (m), radius (m)."""
+
+    centre: tuple[float, float, float]
+    radius: float
+    material: Material
+    solid: bool = True
+
+    def __post_init__(self) -> None:
+        _check(self, self.centre, (self.radius,))
+
+    @property
+    def bottom(self) -> float:
+        """Height of the lowest point, m."""
+        return self.centre[2] - self.radius
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """An upright capsule: centre (m), radius (m), height from tip to tip (m), greater than the diameter."""
+
+    centre: tuple[float, float, float]
+    radius: float
+    height: float
+    material: Material
+    solid: bool = True
+
+    def __post_init__(self) -> None:
+        _check(self, self.centre, (self.radius, self.height))
+        if self.height <= 2.0 * self.radius:
+            raise ValueError(
+                f"a capsule of radius {self.radius!r} m has the height {self.height!r} m; expected more than the "
+                "diameter, or use a Sphere"
+            )
+
+    @property
+    def bottom(self) -> float:
+        """Height of the lowest point, m."""
+        return self.centre[2] - 0.5 * self.height
+
+    @property
+    def straight(self) -> float:
+        """Height of the part between the two half spheres, m."""
+        return self.height - 2.0 * self.radius
+
+
+Primitive: TypeAlias = Box | Cylinder | Sphere | Capsule
+
+
+@dataclass(frozen=True)
+class Light:
+    """A lamp: position (m) and intensity relative to the scene's ambient light of 1."""
+
+    position: tuple[float, float, float]
+    intensity: float
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Primitives, floor, lights and the free region in which people walk.
+
+    Attributes:
+        name: scene name.
+        primitives: what stands on the floor, and walls and ceiling.
+        floor: the floor's material.
+        lights: lamps.
+        ambient: ambient light in [0, 1].
+        bounds: (x_min, x_max, y_min, y_max) of the floor, m.
+        start: (x, y, heading) of the robot at the start of a route, m and rad.
+        start_width: routes start up to this far to either side of `start`, m.
+    """
+
+    name: str
+    primitives: tuple[Primitive, ...]
+    floor: Material
+    lights: tuple[Light, ...]
+    ambient: float
+    bounds: tuple[float, float, float, float]
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    start_width: float = 0.3
+
+    def obstacles(self) -> tuple[Primitive, ...]:
+        """Solid primitives that a person or the robot could run into (those whose lowest point is below 2 m)."""
+        return tuple(p for p in self.primitives if p.solid and p.bottom < 2.0)
+
+    def clearance(self, points: np.ndarray) -> float:
+        """Least horizontal distance between any of the points (n, 2) and any obstacle, m; 0 inside one.
+
+        Round obstacles count with their full radius; without obstacles the clearance is infinite.
+        """
+        return float(self._distances(points).min())
+
+    def is_clear(self, points: np.ndarray, least: float) -> bool:
+        """Whether `clearance(points) >= least` (m); a table decides about most of the points (n, 2)."""
+        table, origin, last = self._table
+        cells = np.minimum(np.maximum((points - origin) * (1.0 / CELL), 0.0), last).astype(np.intp)
+        about = table[cells[:, 0], cells[:, 1]]
+        if (about < least - CELL_REACH).any():
+            return False
+        undecided = ~(about > least + CELL_REACH)
+        return not undecided.any() or self.clearance(points[undecided]) >= least
+
+    def _distances(self, points: np.ndarray) -> np.ndarray:
+        """Return the clearance of each of the points (n, 2), m."""
+        centres, halves, axes, radii = self._footprints
+        offset = points[:, None, :] - centres
+        along = np.abs(offset[..., 0] * axes[:, 0] + offset[..., 1] * axes[:, 1])
+        across = np.abs(offset[..., 1] * axes[:, 0] - offset[..., 0] * axes[:, 1])
+        gap_x, gap_y = np.maximum(along - halves[:, 0], 0.0), np.maximum(across - halves[:, 1], 0.0)
+        distances = np.maximum(np.sqrt(gap_x * gap_x + gap_y * gap_y) - radii, 0.0)
+        least: np.ndarray = distances.min(axis=1, initial=math.inf)
+        return least
+
+    @functools.cached_property
+    def _table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Clearance at the middle of each cell, framed by cells that say NaN: unknown; its corner and last indices."""
+        x0, x1, y0, y1 = self.bounds
+        origin = np.array((x0 - CELL, y0 - CELL))
+        table = np.full((math.ceil((x1 - x0) / CELL) + 2, math.ceil((y1 - y0) / CELL) + 2), np.nan)
+        middles = origin + CELL * (np.moveaxis(np.indices(table.shape), 0, -1) + 0.5)
+        for column, points in zip(table[1:-1, 1:-1], middles[1:-1, 1:-1], strict=True):
+            column[:] = self._distances(points)
+        return table, origin, np.array(table.shape) - 1.0
+
+    @functools.cached_property
+    def _footprints(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Centres (n, 2), half sizes (n, 2), cosine and sine of the yaw (n, 2) and rounding radii (n,) of obstacles."""
+        rows = {
+            (*p.centre[:2], 0.5 * p.size[0], 0.5 * p.size[1], math.cos(p.yaw), math.sin(p.yaw), 0.0)
+            if isinstance(p, Box)
+            else (*p.centre[:2], 0.0, 0.0, 1.0, 0.0, p.radius)
+            for p in self.obstacles()
+        }
+        table = np.array(sorted(rows)).reshape(-1, 7)
+        return table[:, :2], table[:, 2:4], table[:, 4:6], table[:, 6]
+
+    def illumination(self, x: float, y: float) -> float:
+        """Relative brightness at the floor point (x, y): lamps with inverse-square falloff, about 1 under a lamp."""
+        total = 0.0
+        for light in self.lights:
+            dx, dy, dz = light.position[0] - x, light.position[1] - y, light.position[2] - 1.0
+            total += light.intensity * dz * dz / (dx * dx + dy * dy + dz * dz)
+        return total
+
+
+def _check(primitive: Primitive, place: tuple[float, ...], lengths: tuple[float, ...]) -> None:
+    if not (all(map(math.isfinite, (*place, *lengths))) and min(lengths) > 0.0):
+        raise ValueError(f"{primitive!r} cannot be; expected finite metres and radians, and sizes > 0")

@@ -1,0 +1,1 @@
+"""Estimators of the person's bearing and distance."""

@@ -51,7 +51,7 @@ class RobotConfig:
         max_wheel_acceleration: limit on the change of the rim-speed command, m/s^2.
         wheel_time_constant: first-order response of the wheel servos, s.
         max_wheel_torque: N m.
-        camera_forward: camera's optical centre ahead of the axle, m (T_Z = -camera_forward in eq. (29)).
+        camera_forward: camera's optical center ahead of the axle, m (T_Z = -camera_forward in eq. (29)).
         camera_height: camera above the floor, m.
         hull_radius: radius of the circle around the axle midpoint that contains the chassis, m.
     """
@@ -70,7 +70,7 @@ class RobotConfig:
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.camera_forward):
-            raise ValueError(f"robot camera_forward is {self.camera_forward!r}; expected finite metres")
+            raise ValueError(f"robot camera_forward is {self.camera_forward!r}; expected finite meters")
         _require("robot", self, (f.name for f in dataclasses.fields(self) if f.name != "camera_forward"), True)
 
 
@@ -82,7 +82,7 @@ class CameraConfig:
         width, height: picture size, px.
         hfov_deg: horizontal field of view, degrees (paper B: 57.5).
         near, far: clipping distances of the renderer, m.
-        supersample: 1, or 2 for colours averaged over 2 x 2 rays a pixel; depth and ids are those of a pixel's centre.
+        supersample: 1, or 2 for colors averaged over 2 x 2 rays a pixel; depth and ids are those of a pixel's center.
     """
 
     width: int = 320
@@ -101,7 +101,7 @@ class CameraConfig:
             raise ValueError(f"camera hfov_deg is {self.hfov_deg!r}; expected degrees from 1 to 170")
         if not 0.0 < self.near < self.far < math.inf:
             raise ValueError(
-                f"camera near, far are {self.near!r}, {self.far!r}; expected 0 < near < far in metres, finite"
+                f"camera near, far are {self.near!r}, {self.far!r}; expected 0 < near < far in meters, finite"
             )
         if self.supersample not in (1, 2):
             raise ValueError(f"camera supersample is {self.supersample!r}; expected 1 or 2")
@@ -114,13 +114,13 @@ class DepthConfig:
     The formulas are in `camera.sensor.errors.RGBDSensor`. The defaults: noise as measured by Nguyen et al. (2012,
     Kinect) for surfaces that face the camera; eighths of a pixel of disparity, 75 mm and the loss of the projector's
     shadow as in Khoshelham and Elberink (2012, Kinect); 0.5 m because an Xtion returns nothing nearer, 8 m because it
-    quantises to 0.2 m there. The shares lost at edges, on dark and on grazing surfaces are stated, not measured.
+    quantizes to 0.2 m there. The shares lost at edges, on dark and on grazing surfaces are stated, not measured.
 
     Attributes:
         axial_noise: scale on the axial noise 0.0012 + 0.0019 (z - 0.4)^2 m of Nguyen et al. (2012); 0 switches it off.
         lateral_noise: standard deviation on each axis of the place that a pixel's depth is taken from, px at 640 px
             width (Nguyen et al.: 0.8 when facing, 0.9 at 60 degrees).
-        disparity_step: quantisation of the disparity, px, at 640 px width (Xtion: 1/8); 0 switches it off.
+        disparity_step: quantization of the disparity, px, at 640 px width (Xtion: 1/8); 0 switches it off.
         baseline: between projector and camera, m.
         min_range, max_range: depth outside is reported as 0 (no reading), m.
         edge_band: a pixel is at an edge if the depth within this distance (px of the picture) jumps by more than
@@ -129,7 +129,7 @@ class DepthConfig:
         edge_holes: share of the pixels at an edge that read 0.
         edge_flying: share of the pixels at an edge that read a depth between foreground and background.
         shadow: share of the pixels lost where something hides the surface from the projector.
-        dark_level: luminance below which readings get lost, grey levels.
+        dark_level: luminance below which readings get lost, gray levels.
         dark_dropout: share lost at luminance 0; falls linearly to 0 at `dark_level`.
         grazing_deg: angle between ray and surface normal above which readings get lost, degrees.
         grazing_dropout: share lost at 90 degrees; falls to 0 at `grazing_deg`, linearly in the cosine.
@@ -169,14 +169,14 @@ class DepthConfig:
 
 
 @dataclasses.dataclass(frozen=True)
-class ColourConfig:
-    """Errors of the colour camera, applied to the rendered picture.
+class ColorConfig:
+    """Errors of the color camera, applied to the rendered picture.
 
     The defaults are those of a small webcam sensor in a lit room: stated, not measured.
 
     Attributes:
-        read_noise: standard deviation of the noise in the dark, grey levels.
-        shot_noise: standard deviation of the noise that grows with the root of the light, grey levels at level 1.
+        read_noise: standard deviation of the noise in the dark, gray levels.
+        shot_noise: standard deviation of the noise that grows with the root of the light, gray levels at level 1.
         blur: standard deviation of the Gaussian blur, px at 640 px width.
         gain: exposure; what exceeds 255 is cut.
     """
@@ -187,9 +187,9 @@ class ColourConfig:
     gain: float = 1.0
 
     def __post_init__(self) -> None:
-        _require("colour", self, (field.name for field in dataclasses.fields(self)))
+        _require("color", self, (field.name for field in dataclasses.fields(self)))
         if self.blur > 50.0:
-            raise ValueError(f"colour blur is {self.blur!r}; expected up to 50 px")
+            raise ValueError(f"color blur is {self.blur!r}; expected up to 50 px")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -211,13 +211,13 @@ class BoxConfig:
     """Jitter of the person's bounding box around the tight box of the visible pixels.
 
     Attributes:
-        centre_jitter: standard deviation of the centre's error, as a share of the box's width and height.
+        center_jitter: standard deviation of the center's error, as a share of the box's width and height.
         size_jitter: standard deviation of the relative error of width and height.
         correlation_s: time constant of the errors (first-order Gauss-Markov), s; 0 = independent from frame to frame.
         min_pixels: fewer visible pixels than this are not detected.
     """
 
-    centre_jitter: float = 0.03
+    center_jitter: float = 0.03
     size_jitter: float = 0.04
     correlation_s: float = 0.1
     min_pixels: int = 20
@@ -264,7 +264,7 @@ class MeasurementConfig:
         if not -math.inf < self.outlier_low <= self.outlier_high < math.inf:
             raise ValueError(
                 f"measurement outlier_low, outlier_high are {self.outlier_low!r}, {self.outlier_high!r}; "
-                "expected finite metres, low <= high"
+                "expected finite meters, low <= high"
             )
 
 
@@ -272,11 +272,11 @@ class MeasurementConfig:
 class SensorConfig:
     """All sensor errors.
 
-    `depth`, `colour`, `frames` and `box` act on rendered frames, `measurement` on the `measurement` observation.
+    `depth`, `color`, `frames` and `box` act on rendered frames, `measurement` on the `measurement` observation.
     """
 
     depth: DepthConfig = DepthConfig()
-    colour: ColourConfig = ColourConfig()
+    color: ColorConfig = ColorConfig()
     frames: FrameConfig = FrameConfig()
     box: BoxConfig = BoxConfig()
     measurement: MeasurementConfig = MeasurementConfig()
@@ -294,9 +294,9 @@ IDEAL_SENSOR = SensorConfig(
         dark_dropout=0.0,
         grazing_dropout=0.0,
     ),
-    ColourConfig(read_noise=0.0, shot_noise=0.0, blur=0.0),
+    ColorConfig(read_noise=0.0, shot_noise=0.0, blur=0.0),
     FrameConfig(),
-    BoxConfig(centre_jitter=0.0, size_jitter=0.0),
+    BoxConfig(center_jitter=0.0, size_jitter=0.0),
     MeasurementConfig(bearing_noise=0.0, distance_bias=0.0, distance_noise=0.0),
 )
 """No errors at all."""
@@ -313,12 +313,12 @@ HARSH_SENSOR = SensorConfig(
         dark_dropout=0.9,
         grazing_deg=60.0,
     ),
-    ColourConfig(read_noise=4.0, shot_noise=0.4, blur=2.0, gain=0.6),
+    ColorConfig(read_noise=4.0, shot_noise=0.4, blur=2.0, gain=0.6),
     FrameConfig(drop_share=0.1),
-    BoxConfig(centre_jitter=0.06, size_jitter=0.08),
+    BoxConfig(center_jitter=0.06, size_jitter=0.08),
     MeasurementConfig(bearing_noise=0.024, distance_noise=0.03, outlier_share=0.05, miss_share=0.1),
 )
-"""A bad day: sunlight on the pattern, dim light for the colours, a busy bus. Stated, not measured: about twice the
+"""A bad day: sunlight on the pattern, dim light for the colors, a busy bus. Stated, not measured: about twice the
 noise, half the range, one frame in ten lost."""
 SENSORS = {"xtion": SensorConfig(), "xtion_harsh": HARSH_SENSOR, "ideal": IDEAL_SENSOR}
 """Named sensors."""

@@ -5,7 +5,7 @@ origin in the robot (here: the axle midpoint), so x_w right, y_w down, z_w forwa
 the left: `bearing = -theta_paper`.
 
 Pixels: u runs to the right and v down, counted from the picture's upper left *corner*; the pixel in column i and row j
-covers [i, i+1) x [j, j+1), its centre is (i + 0.5, j + 0.5), and the middle of the picture is (width/2, height/2).
+covers [i, i+1) x [j, j+1), its center is (i + 0.5, j + 0.5), and the middle of the picture is (width/2, height/2).
 Resizing a picture therefore scales all its intrinsics alike.
 """
 
@@ -48,7 +48,7 @@ class Intrinsics:
 
     @classmethod
     def from_hfov(cls, width: int, height: int, hfov: float) -> Intrinsics:
-        """Build intrinsics of square pixels, centred, from the horizontal field of view: fx = (width/2) / tan(hfov/2).
+        """Build intrinsics of square pixels, centered, from the horizontal field of view: fx = (width/2) / tan(hfov/2).
 
         Args:
             width: Picture width, pixels.

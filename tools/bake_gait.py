@@ -70,7 +70,7 @@ def cycle(clip: str) -> dict[str, np.ndarray]:
     }
 
 
-def _pose(frame: np.ndarray, travelled: float, columns: tuple[int, ...]) -> np.ndarray:
+def _pose(frame: np.ndarray, traveled: float, columns: tuple[int, ...]) -> np.ndarray:
     """Return one side's row: rotations, ankle (3) from the evenly moving pelvis, foot pitch, pelvis left and up."""
     hip, knee, ankle, shoulder, elbow = columns
     side = 1.0 if hip == 30 else -1.0
@@ -83,7 +83,7 @@ def _pose(frame: np.ndarray, travelled: float, columns: tuple[int, ...]) -> np.n
     shin = _times(thigh, _hinge(frame[knee]))
     foot = _times(shin, _turn(frame[ankle : ankle + 4]))
     sway, up = -frame[3], frame[2]
-    at = np.array([frame[1] - travelled, sway, 0.0])
+    at = np.array([frame[1] - traveled, sway, 0.0])
     at = (
         at
         + _rotate(pelvis, (0.0, side * HIP, 0.0))

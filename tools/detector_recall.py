@@ -150,7 +150,7 @@ def blazepose(views: list[View]) -> list[list[Box]]:
         small = cv2.resize(square, (size, size), interpolation=cv2.INTER_AREA)
         net.set_tensor(given["index"], (small[None] / 127.5 - 1.0).astype(np.float32))
         net.invoke()
-        points = net.get_tensor(raw["index"])[0].reshape(-1, 6, 2) / size  # face: centre, size; hips, rim, two unused
+        points = net.get_tensor(raw["index"])[0].reshape(-1, 6, 2) / size  # face: center, size; hips, rim, two unused
         points[:, [0, 2, 3]] += np.concatenate(cells)[:, None]
         faces = np.hstack((points[:, 0] - 0.5 * points[:, 1], points[:, 1]))
         scores = net.get_tensor(logit["index"])[0, :, 0]  # a score of 0.5 is a logit of 0
@@ -178,7 +178,7 @@ def boxed(found: Box, view: View) -> bool:
 
 
 def encircled(found: Box, view: View) -> bool:
-    """Return whether the circle's centre is in the box of the visible pixels and its height fits the whole body."""
+    """Return whether the circle's center is in the box of the visible pixels and its height fits the whole body."""
     inside = all(view.box[k] <= 0.5 * (found[k] + found[k + 2]) <= view.box[k + 2] for k in (0, 1))
     common = min(found[3], view.whole[3]) - max(found[1], view.whole[1])
     return inside and common >= 0.5 * (max(found[3], view.whole[3]) - min(found[1], view.whole[1]))

@@ -118,12 +118,12 @@ def _seal(base: Base, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     teeth = np.unique(base.quads["helper-upper-teeth"] + base.quads["helper-lower-teeth"])
     eye = np.unique(base.quads["helper-l-eye"])
     for used, reach, is_socket in ((teeth, 1.35, False), (eye, 1.5, True)):
-        centre = 0.5 * (points[used].min(axis=0) + points[used].max(axis=0))
-        towards = centre - points
+        center = 0.5 * (points[used].min(axis=0) + points[used].max(axis=0))
+        toward = center - points
         radius = 0.5 * np.ptp(points[used], axis=0).max()
-        found = body & ((towards**2).sum(axis=1) < (reach * radius) ** 2) & ((towards * normals).sum(axis=1) > 0)
+        found = body & ((toward**2).sum(axis=1) < (reach * radius) ** 2) & ((toward * normals).sum(axis=1) > 0)
         if not is_socket:  # the nose and the chin look back at the teeth too
-            found &= (towards[:, 0] > -0.3 * radius) | (np.abs(towards[:, 2]) < 0.013)
+            found &= (toward[:, 0] > -0.3 * radius) | (np.abs(toward[:, 2]) < 0.013)
         inside |= found
         sockets |= found & is_socket
     target = np.where(inside, -1, np.arange(len(points)))

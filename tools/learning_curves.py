@@ -39,12 +39,12 @@ def main(folder: Path, picture: Path) -> None:
     figure, axes = plt.subplots(1, len(PANELS), figsize=(10.0, 4.0), layout="constrained")
     for panel, (key, label, scale, limits) in zip(axes, PANELS, strict=True):
         for recipe, curves in trainings.items():
-            colour, marker = LOOKS[recipe]
+            color, marker = LOOKS[recipe]
             for number, curve in enumerate(curves):
                 steps = [leg["steps"] / 1e6 for leg in curve]
                 errors = [scale * leg[key] for leg in curve]
                 name = f"{recipe} ({len(curves)})" if number == 0 else None
-                panel.plot(steps, errors, color=colour, marker=marker, markersize=4, linewidth=1.2, label=name)
+                panel.plot(steps, errors, color=color, marker=marker, markersize=4, linewidth=1.2, label=name)
         panel.axhline(scale * reference[key], color="black", linestyle="--", label="AKF + PI")
         panel.set(xscale="log", yscale="log", ylim=limits, xlabel="steps (millions)", ylabel=label)
         for axis in (panel.xaxis, panel.yaxis):

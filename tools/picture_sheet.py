@@ -25,8 +25,8 @@ VIEWS["cabin"] = (CameraPose(-2.8, 0.0, 1.0, 0.0), CameraPose(3.2, -0.7, 1.4, 2.
 """Where each place is seen from: along it, across it, and by the robot; everywhere else by the robot, `EYE`."""
 DEPTH_RANGE = 8.0
 INK, PAPER = (40, 40, 40), 255
-ID_COLOURS = np.array(((225, 225, 225), (230, 159, 0), (0, 114, 178)), np.uint8)
-"""Okabe-Ito: scene grey, the person to follow orange, others blue."""
+ID_COLORS = np.array(((225, 225, 225), (230, 159, 0), (0, 114, 178)), np.uint8)
+"""Okabe-Ito: scene gray, the person to follow orange, others blue."""
 
 
 def main(folder: Path) -> None:
@@ -60,7 +60,7 @@ def people_sheet() -> list[list[np.ndarray]]:
             tile(shot(places[name], EYE, person(EYE, distance, body, outfit)).rgb, f"{name}, {distance:g} m")
             for name, body, outfit, distance in views
         ],
-        [tile(frame.rgb, "colour"), depth_tile(frame), id_tile(frame)],
+        [tile(frame.rgb, "color"), depth_tile(frame), id_tile(frame)],
     ]
 
 
@@ -113,7 +113,7 @@ def shot(place: Scene, eye: CameraPose, people: tuple) -> RGBDFrame:
 
 
 def depth_tile(frame: RGBDFrame) -> np.ndarray:
-    """Return the depth in colours, with the bar that explains them in its head."""
+    """Return the depth in colors, with the bar that explains them in its head."""
     share = np.clip(frame.depth / DEPTH_RANGE, 0.0, 1.0)
     picture = tile(viridis(1.0 - share), "depth")
     left, right = 80, CAMERA.width - 42
@@ -124,13 +124,13 @@ def depth_tile(frame: RGBDFrame) -> np.ndarray:
 
 
 def viridis(share: np.ndarray) -> np.ndarray:
-    """Return the colours (H, W, 3) of shares (H, W) in [0, 1]."""
+    """Return the colors (H, W, 3) of shares (H, W) in [0, 1]."""
     return cv2.applyColorMap((255.0 * share).astype(np.uint8), cv2.COLORMAP_VIRIDIS)[:, :, ::-1]
 
 
 def id_tile(frame: RGBDFrame) -> np.ndarray:
-    """Return the ids in colours."""
-    return tile(ID_COLOURS[frame.ids], "ids: orange = the person")
+    """Return the ids in colors."""
+    return tile(ID_COLORS[frame.ids], "ids: orange = the person")
 
 
 def tile(picture: np.ndarray, label: str) -> np.ndarray:

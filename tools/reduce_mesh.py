@@ -1,6 +1,6 @@
 """Reduce triangles by edge collapses with quadric errors (Garland and Heckbert 1997), for many shapes of one topology.
 
-A collapse moves a vertex onto a neighbour, so what remains is a subset of the vertices, and lower levels of detail are
+A collapse moves a vertex onto a neighbor, so what remains is a subset of the vertices, and lower levels of detail are
 subsets of higher ones. The error is summed over all shapes.
 """
 
@@ -59,7 +59,7 @@ class _Mesh:
         self.version = [0] * len(self.points)
         self.heap: list[tuple[float, int, int, int, int]] = []
         for v in range(len(self.points)):
-            for n in self._neighbours(v):
+            for n in self._neighbors(v):
                 self._push(v, n)
 
     def collapse_until(self, target: int) -> None:
@@ -92,7 +92,7 @@ class _Mesh:
                     quadrics[v] += held
         return quadrics * self.importance[:, None, None]
 
-    def _neighbours(self, v: int) -> set[int]:
+    def _neighbors(self, v: int) -> set[int]:
         return {n for f in self.around[v] for n in self.faces[f]} - {v}
 
     def _push(self, gone: int, stays: int) -> None:
@@ -107,7 +107,7 @@ class _Mesh:
         shared = self.around[gone] & self.around[stays]
         if self.features[gone] and len(shared) != 1 and not self._crease(gone, stays):
             return False
-        common = self._neighbours(gone) & self._neighbours(stays)
+        common = self._neighbors(gone) & self._neighbors(stays)
         if len(common) != len(shared):
             return False
         for f in self.around[gone] - shared:
@@ -139,7 +139,7 @@ class _Mesh:
         self.version[gone] += 1
         self.version[stays] += 1
         self.quadrics[stays] += self.quadrics[gone]
-        for n in sorted(self._neighbours(stays)):
+        for n in sorted(self._neighbors(stays)):
             self._push(n, stays)
             self._push(stays, n)
 

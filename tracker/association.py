@@ -68,7 +68,7 @@ def associate(
     """Return the most likely of the candidates inside the gate, eq. (4); of equals the nearest.
 
     As printed, eq. (15), all places inside the gate are equally likely and the similarity alone decides. It is a poor
-    judge between people side by side: half a metre costs less than a box that has grown by a tenth.
+    judge between people side by side: half a meter costs less than a box that has grown by a tenth.
 
     Args:
         candidates: Detections of the frame that have a depth. Their positions are the raw S_k, never smoothed.
@@ -145,8 +145,8 @@ def log_similarity(box: Box, tracked: Box, size: tuple[int, int], alphas: tuple[
     Raises:
         ValueError: If a box is empty, inverted or not finite.
     """
-    u, v, width, height = _normalised(box, size)
-    tracked_u, tracked_v, tracked_width, tracked_height = _normalised(tracked, size)
+    u, v, width, height = _normalized(box, size)
+    tracked_u, tracked_v, tracked_width, tracked_height = _normalized(tracked, size)
     shift = math.sqrt((u - tracked_u) ** 2 + (v - tracked_v) ** 2)  # (17)
     growth = abs(width * height - tracked_width * tracked_height)  # (18)
     aspect = abs(width / height - tracked_width / tracked_height)  # (19)
@@ -165,8 +165,8 @@ def _common(one: Box, other: Box) -> Box:
     return u0, v0, max(min(one[2], other[2]), u0), max(min(one[3], other[3]), v0)
 
 
-def _normalised(box: Box, size: tuple[int, int]) -> tuple[float, float, float, float]:
-    """Return centre, width and height as shares of the picture."""
+def _normalized(box: Box, size: tuple[int, int]) -> tuple[float, float, float, float]:
+    """Return center, width and height as shares of the picture."""
     u0, v0, u1, v1 = box
     if not (-math.inf < u0 < u1 < math.inf and -math.inf < v0 < v1 < math.inf):
         raise ValueError(

@@ -20,7 +20,7 @@ Rule = Literal["six_smallest", "grid_mean", "grid_median", "centroid"]
 Box = tuple[float, float, float, float]
 
 VALID_RANGE = (0.5, 8.0)
-"""Depths taken by default, m: an Xtion returns nothing nearer than about 0.5 m and quantises to 0.2 m at 8 m."""
+"""Depths taken by default, m: an Xtion returns nothing nearer than about 0.5 m and quantizes to 0.2 m at 8 m."""
 
 FEWEST_SAMPLES = 3
 
@@ -41,7 +41,7 @@ def box_depth(
             result lies 1.25 standard deviations before the mean.
         grid_mean: Mean of the valid samples of that grid.
         grid_median: Their median.
-        centroid: Paper B, eqs. (24)-(25) read literally: the depth at the box's centre, here the median of the valid
+        centroid: Paper B, eqs. (24)-(25) read literally: the depth at the box's center, here the median of the valid
             samples of the 3x3 pixels around it.
 
     Args:
@@ -63,7 +63,7 @@ def box_depth(
         raise ValueError(f"depth rule is {rule!r}, expected one of {', '.join(RULES)}.")
     nearest, farthest = valid_range
     if not 0.0 < nearest < farthest:
-        raise ValueError(f"valid_range is {valid_range}, expected 0 < nearest < farthest in metres.")
+        raise ValueError(f"valid_range is {valid_range}, expected 0 < nearest < farthest in meters.")
     if depth.ndim != 2:
         raise ValueError(f"depth has shape {depth.shape}, expected (height, width).")
     visible = _clipped(box, depth.shape[1], depth.shape[0])
@@ -80,7 +80,7 @@ def seen_at(
 ) -> tuple[Box, float] | None:
     """Return the part of a box that shows a person at an expected depth, and its depth m; None if it shows another.
 
-    Of two people close to each other a detector's boxes are seldom those of one: they take in part of the neighbour or
+    Of two people close to each other a detector's boxes are seldom those of one: they take in part of the neighbor or
     both. The middle of such a box and the six smallest of its samples are then nobody's, and a tracker that takes them
     drifts from one person to the other, inside the gate all the way. So the box is cut on its left and right to the
     columns at the expected depth, and only samples at that depth are taken. Where more of them are nearer, somebody

@@ -183,5 +183,5 @@ def _line(samples: Sequence[tuple[float, Vector]]) -> tuple[Vector, Vector, floa
 
 def _finite(position: Vector) -> Vector:
     if not all(map(math.isfinite, position)):
-        raise ValueError(f"measured position is {position}, expected three finite numbers in metres; None for a miss.")
+        raise ValueError(f"measured position is {position}, expected three finite numbers in meters; None for a miss.")
     return position

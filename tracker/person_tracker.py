@@ -168,7 +168,7 @@ class PersonTracker:
 
     Args:
         detector: Finds the people in a picture; run on the processed frames only.
-        intrinsics: Of the colour picture and the depth, which are registered and equally large.
+        intrinsics: Of the color picture and the depth, which are registered and equally large.
         mount: Where the camera is on the robot; the default gives positions in the camera's own place.
         settings: See `TrackerSettings`.
     """
@@ -365,7 +365,7 @@ class PersonTracker:
     def _check(self, rgb: NDArray[np.uint8], depth: NDArray[np.float32]) -> None:
         if rgb.ndim != 3 or depth.ndim != 2 or rgb.shape[:2] != depth.shape:
             raise ValueError(
-                f"colour has shape {rgb.shape} and depth {depth.shape}; expected (H, W, 3) and (H, W), equally large."
+                f"color has shape {rgb.shape} and depth {depth.shape}; expected (H, W, 3) and (H, W), equally large."
             )
         if depth.shape[::-1] != self._size:
             raise ValueError(
@@ -374,7 +374,7 @@ class PersonTracker:
             )
         if not np.issubdtype(depth.dtype, np.floating):
             raise TypeError(
-                f"depth has type {depth.dtype}; expected floating point metres (divide millimetres by 1000)."
+                f"depth has type {depth.dtype}; expected floating point meters (divide millimeters by 1000)."
             )
 
 

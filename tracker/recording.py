@@ -1,14 +1,14 @@
-"""`Recording`: a folder of colour and depth pictures that somebody recorded, read frame by frame.
+"""`Recording`: a folder of color and depth pictures that somebody recorded, read frame by frame.
 
 Layout of the folder::
 
     camera.json     {"width": 640, "height": 480, "fx": 525.0, "fy": 525.0, "cx": 319.5, "cy": 239.5, "fps": 30,
                      "depth_scale": 0.001, "mounting": {"forward": 0.1, "height": 1.0}}
     color/ or rgb/  PNG or JPEG pictures
-    depth/          16-bit PNG pictures, registered to the colour pictures and equally large; 0 = no reading
+    depth/          16-bit PNG pictures, registered to the color pictures and equally large; 0 = no reading
 
-Widths, focal lengths and the principal point are px, `depth_scale` is metres per unit of the depth pictures (0.001 when
-absent: millimetres) and `mounting` places the camera on the robot (at the origin when absent), m. Pictures make a pair
+Widths, focal lengths and the principal point are px, `depth_scale` is meters per unit of the depth pictures (0.001 when
+absent: millimeters) and `mounting` places the camera on the robot (at the origin when absent), m. Pictures make a pair
 if they have the same name; or, where no names agree and all are times in seconds, if they are nearest in time and no
 further apart than half a period; or, where there are equally many of each, by the order of their names.
 """
@@ -28,10 +28,10 @@ from numpy.typing import NDArray
 from follow_env.geometry import CAMERA_FRAME, CameraMount, Intrinsics
 
 CAMERA_FILE = "camera.json"
-COLOUR_FOLDERS = ("color", "rgb")
+COLOR_FOLDERS = ("color", "rgb")
 DEPTH_FOLDER = "depth"
-COLOUR_SUFFIXES = (".png", ".jpg", ".jpeg")
-MILLIMETRE = 0.001
+COLOR_SUFFIXES = (".png", ".jpg", ".jpeg")
+MILLIMETER = 0.001
 
 
 class UnreadableFrame(ValueError):
@@ -44,11 +44,11 @@ class Recording:
 
     Attributes:
         folder: Where it is.
-        intrinsics: Of colour and depth.
+        intrinsics: Of color and depth.
         mount: Of the camera on the robot.
         rate: Frames/s.
-        depth_scale: Metres per unit of the depth pictures.
-        frames: Files (colour, depth) of each frame.
+        depth_scale: Meters per unit of the depth pictures.
+        frames: Files (color, depth) of each frame.
     """
 
     folder: Path
@@ -67,16 +67,16 @@ class Recording:
         """
         if not folder.is_dir():
             raise ValueError(f"the recording {folder} is not a folder; name one with {CAMERA_FILE}, color and depth.")
-        colour_folder = next((folder / name for name in COLOUR_FOLDERS if (folder / name).is_dir()), None)
+        color_folder = next((folder / name for name in COLOR_FOLDERS if (folder / name).is_dir()), None)
         depth_folder = folder / DEPTH_FOLDER
-        if colour_folder is None or not depth_folder.is_dir():
+        if color_folder is None or not depth_folder.is_dir():
             raise ValueError(
                 f"the recording {folder} holds no folders color (or rgb) and depth; expected one of pictures for each."
             )
         settings = _camera_settings(folder / CAMERA_FILE)
-        colour = sorted(path for path in colour_folder.iterdir() if path.suffix.lower() in COLOUR_SUFFIXES)
+        color = sorted(path for path in color_folder.iterdir() if path.suffix.lower() in COLOR_SUFFIXES)
         depth = sorted(path for path in depth_folder.iterdir() if path.suffix.lower() == ".png")
-        for where, files, kind in ((colour_folder, colour, "PNG or JPEG"), (depth_folder, depth, "16-bit PNG")):
+        for where, files, kind in ((color_folder, color, "PNG or JPEG"), (depth_folder, depth, "16-bit PNG")):
             if not files:
                 raise ValueError(f"{where} holds no picture; expected {kind} files.")
         rate = _number(settings, "fps")
@@ -85,32 +85,32 @@ class Recording:
             _intrinsics(settings),
             _mount(settings.get("mounting")),
             rate,
-            _number({"depth_scale": MILLIMETRE, **settings}, "depth_scale"),
-            _pairs(colour, depth, rate),
+            _number({"depth_scale": MILLIMETER, **settings}, "depth_scale"),
+            _pairs(color, depth, rate),
         )
 
     def read(self, index: int) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """Return colour (H, W, 3) uint8 RGB and depth (H, W) float32 m of a frame.
+        """Return color (H, W, 3) uint8 RGB and depth (H, W) float32 m of a frame.
 
         Raises:
             UnreadableFrame: If one of the two files cannot be read or decoded.
             ValueError: If a picture is not of the camera's size or the depth not 16-bit.
         """
-        colour_file, depth_file = self.frames[index]
-        colour, depth = _decoded(colour_file, cv2.IMREAD_COLOR), _decoded(depth_file, cv2.IMREAD_UNCHANGED)
+        color_file, depth_file = self.frames[index]
+        color, depth = _decoded(color_file, cv2.IMREAD_COLOR), _decoded(depth_file, cv2.IMREAD_UNCHANGED)
         if depth.ndim != 2 or depth.dtype != np.uint16:
-            raise ValueError(f"{depth_file} is not a 16-bit grey picture; expected depth as 16-bit PNG.")
+            raise ValueError(f"{depth_file} is not a 16-bit gray picture; expected depth as 16-bit PNG.")
         size = (self.intrinsics.width, self.intrinsics.height)
-        if colour.shape[:2] != depth.shape:
+        if color.shape[:2] != depth.shape:
             raise ValueError(
-                f"{colour_file} is {_size(colour)} but {depth_file} is {_size(depth)}; "
-                "expected depth registered to the colour picture, equally large."
+                f"{color_file} is {_size(color)} but {depth_file} is {_size(depth)}; "
+                "expected depth registered to the color picture, equally large."
             )
         if depth.shape[::-1] != size:
             raise ValueError(
                 f"{depth_file} is {_size(depth)} but {CAMERA_FILE} is for {size[0]}x{size[1]}; correct it."
             )
-        return np.ascontiguousarray(colour[:, :, ::-1]), depth.astype(np.float32) * np.float32(self.depth_scale)
+        return np.ascontiguousarray(color[:, :, ::-1]), depth.astype(np.float32) * np.float32(self.depth_scale)
 
 
 def _camera_settings(file: Path) -> dict[str, Any]:
@@ -154,24 +154,22 @@ def _mount(mounting: Any) -> CameraMount:
     return CameraMount(_number(mounting, "forward", False), _number(mounting, "height", False))
 
 
-def _pairs(colour: list[Path], depth: list[Path], rate: float) -> tuple[tuple[Path, Path], ...]:
-    if {path.stem for path in colour} & {path.stem for path in depth}:
-        return tuple((path, depth[0].with_name(f"{path.stem}.png")) for path in colour)
-    colour_times, depth_times = _times(colour), _times(depth)
-    if colour_times is not None and depth_times is not None:
-        gaps = np.abs(depth_times - colour_times[:, None])
+def _pairs(color: list[Path], depth: list[Path], rate: float) -> tuple[tuple[Path, Path], ...]:
+    if {path.stem for path in color} & {path.stem for path in depth}:
+        return tuple((path, depth[0].with_name(f"{path.stem}.png")) for path in color)
+    color_times, depth_times = _times(color), _times(depth)
+    if color_times is not None and depth_times is not None:
+        gaps = np.abs(depth_times - color_times[:, None])
         nearest = gaps.argmin(axis=1)
         near = [
-            (path, depth[j])
-            for i, (path, j) in enumerate(zip(colour, nearest, strict=True))
-            if gaps[i, j] <= 0.5 / rate
+            (path, depth[j]) for i, (path, j) in enumerate(zip(color, nearest, strict=True)) if gaps[i, j] <= 0.5 / rate
         ]
         if near:
             return tuple(near)
-    if len(colour) == len(depth):
-        return tuple(zip(colour, depth, strict=True))
+    if len(color) == len(depth):
+        return tuple(zip(color, depth, strict=True))
     raise ValueError(
-        f"{len(colour)} colour and {len(depth)} depth pictures make no pairs; expected equal names, "
+        f"{len(color)} color and {len(depth)} depth pictures make no pairs; expected equal names, "
         "names that are times in seconds, or equally many of each."
     )
 

@@ -11,8 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from baselines.benchmark.cells import ESTIMATORS, PIXELS, Cell
+from baselines.followers.build import make_follower
 from baselines.followers.calibration import NoiseModel, Pair, detector_settings, noise_model, sensor
-from baselines.followers.policy import OBSERVATION_OF, Policy, make_follower
+from baselines.followers.perception import OBSERVATION_OF
+from baselines.followers.policy import Policy
 from baselines.followers.references import FLOORS
 from follow_env.config import CameraConfig, choose
 from tracker.person_tracker import Detector

@@ -16,7 +16,7 @@ from typing import Any
 
 from baselines.benchmark.cells import ENVIRONMENT_IDS, Cell, family_cells, rule_cells, sensitivity_cells, table1_cells
 from baselines.benchmark.executors.processes import Keyed
-from baselines.benchmark.metrics.episode import episode as metrics
+from baselines.benchmark.metrics import episode as metrics
 from follow_env.config import CameraConfig, RobotConfig, SensorConfig
 
 EPISODES = {"truth": 100, "emulated": 100, "mask": 20, "detector": 20}

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.metrics.episode import EpisodeMetrics, Row, quantile
 from baselines.benchmark.metrics.tracking import TrackingMetrics
-from baselines.followers.policy import TrackingState
-from tracker.estimators.filters import LockOutWarning
+from baselines.followers.tracking_follower import TrackingState
+from tracker.estimators import LockOutWarning
 
 
 @dataclass(frozen=True, slots=True)

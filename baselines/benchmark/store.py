@@ -1,7 +1,7 @@
 """The store of finished episodes: an SQLite file in which an episode is one transaction.
 
 A run that is killed at any point keeps every episode that was finished, and none is counted twice: cell and seed are
-the primary key. The rollback journal with full synchronisation also survives a power cut, works on network folders,
+the primary key. The rollback journal with full synchronization also survives a power cut, works on network folders,
 and lets several processes write to one store.
 """
 

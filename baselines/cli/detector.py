@@ -52,9 +52,9 @@ def add(commands: Commands) -> None:
 def _run(parsed: argparse.Namespace) -> None:
     try:
         with bad_input(ValueError, OSError):
-            from baselines.cli.main import detector_actions as commands
+            from baselines.cli import detector_actions
 
-            text = getattr(commands, parsed.action)(parsed)
+            text = getattr(detector_actions, parsed.action)(parsed)
     except ModuleNotFoundError as error:
         raise CommandError(f"{error.name} is missing; `pip install follow-env[learn]` brings it", FAILED) from error
     print(text)

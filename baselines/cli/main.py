@@ -7,8 +7,8 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
+from baselines.cli import bench, calibrate, detector, export, reproduce, speed, track, train, watch
 from baselines.cli.exits import BAD_INPUT, FAILED, INTERRUPTED, CommandError
-from baselines.cli.main import bench, calibrate, detector, export, reproduce, speed, track, train, watch
 
 __all__ = ["BAD_INPUT", "FAILED", "INTERRUPTED", "main"]
 

@@ -1,4 +1,4 @@
-"""`follow track`: track a person in recorded colour and depth pictures."""
+"""`follow track`: track a person in recorded color and depth pictures."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def add(commands: Commands) -> None:
     """Add the command to ``follow``."""
     track = commands.add_parser(
         "track",
-        help="track a person in recorded colour and depth pictures",
+        help="track a person in recorded color and depth pictures",
         description="Track a person through a recording: a folder with camera.json, color/ (or rgb/) and depth/; "
         "`tracker/recording.py` describes it.",
     )

@@ -8,7 +8,7 @@ Pair = tuple[float, float]
 
 
 class PIController:
-    """Turn towards the target and keep a distance: u_i = kp_i e_i + ki_i sum(e_i dt), eq. (32) read diagonally.
+    """Turn toward the target and keep a distance: u_i = kp_i e_i + ki_i sum(e_i dt), eq. (32) read diagonally.
 
     omega comes from the bearing error (target to the left, turn left), v from the distance error (target farther than
     the set-point, drive on). The sum includes the current error, as printed.

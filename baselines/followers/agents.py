@@ -16,7 +16,7 @@ from baselines.followers.calibration import Pair, noise_model
 from baselines.followers.networks import ACTIVATIONS, Arrays, Memory, Network
 from baselines.learned.recipes import CONTROL_HZ, ENVIRONMENT, OBSERVATIONS
 from follow_env.config import choose
-from tracker.estimators.filters import AdaptiveKalmanFilter, Estimate, Estimator
+from tracker.estimators import AdaptiveKalmanFilter, Estimate, Estimator
 
 SUFFIX = ".safetensors"
 

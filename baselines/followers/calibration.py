@@ -1,7 +1,6 @@
 """The calibrated parameters, read from `calibration.json`: measured errors, emulated sensors, noise of the filters.
 
-`follow calibrate` (`baselines.papers.dong2018.calibrate`) made the file; nothing in it is tuned by hand. What belongs to
-the
+`follow calibrate` made the file (`papers.dong2018.calibrate`); nothing in it is tuned by hand. What belongs to the
 shipped detector stands beside it in `calibration_detector.json` (`follow calibrate --detector`), as it changes with the
 weights.
 """

@@ -13,7 +13,7 @@ from baselines.followers.calibration import Pair
 from baselines.followers.policy import Policy
 from follow_env.config import RobotConfig
 from follow_env.envs.task import SET_POINT
-from tracker.estimators.filters import Estimate
+from tracker.estimators import Estimate
 
 
 @dataclass
@@ -51,7 +51,7 @@ class Random:
 class Oracle:
     """Knows bearing, distance and the person's velocity (`state` observation), and has only the robot's limits.
 
-    Feedback linearisation of the relative motion: with the person at (d, y) in the robot frame moving at (a, b),
+    Feedback linearization of the relative motion: with the person at (d, y) in the robot frame moving at (a, b),
     d' = a - v + omega y and y' = b - omega d, so v = a + omega y + k (d - SET_POINT) and omega = (b + k y) / d make
     both errors decay at the rate k.
 

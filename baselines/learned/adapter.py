@@ -1,6 +1,6 @@
 """`FollowVecEnv`: Stable-Baselines3's `VecEnv` over batches of worlds.
 
-A batch has one configuration; several batches side by side are how domains are randomised. Nothing is copied world by
+A batch has one configuration; several batches side by side are how domains are randomized. Nothing is copied world by
 world: the batches write into one array, and the infos of worlds that go on are one shared empty dictionary.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from stable_baselines3.common.vec_env import VecEnv
 
-from tracker.estimators.batch import BatchFilter
+from tracker.estimators.akf_batch import BatchFilter
 
 _EPISODE_KEYS = ("is_success", "collision")
 

@@ -1,4 +1,4 @@
-"""Behaviour cloning: a picture agent first learns to act as the oracle, which knows what the picture only shows."""
+"""Behavior cloning: a picture agent first learns to act as the oracle, which knows what the picture only shows."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def clone_oracle(model: PPO, worlds: FollowVecEnv, steps: int, seed: int, epochs
     oracle = Oracle()
     pictures = np.empty((steps // count * count, *worlds.observation_space.shape), np.uint8)  # type: ignore[misc]
     labels = np.empty((len(pictures), 2), np.float32)
-    optimiser = torch.optim.Adam(model.policy.parameters(), lr=1e-3)
+    optimizer = torch.optim.Adam(model.policy.parameters(), lr=1e-3)
     noise = MOST_NOISE * rng.random((count, 1))
     observations: Any = worlds.reset()
     loss = float("nan")
@@ -46,11 +46,11 @@ def clone_oracle(model: PPO, worlds: FollowVecEnv, steps: int, seed: int, epochs
         driven[::2] = model.predict(observations[::2], deterministic=True)[0]
         observations, *_ = worlds.step(driven + noise * rng.standard_normal((count, 2)))
         if k % 4 == 3:
-            _fit(model, optimiser, pictures, labels, rng.integers(0, (k + 1) * count, BATCH))
+            _fit(model, optimizer, pictures, labels, rng.integers(0, (k + 1) * count, BATCH))
     for _ in range(epochs):
         order = rng.permutation(len(pictures))
         losses = [
-            _fit(model, optimiser, pictures, labels, order[first : first + BATCH])
+            _fit(model, optimizer, pictures, labels, order[first : first + BATCH])
             for first in range(0, len(order), BATCH)
         ]
         loss = float(np.mean(losses))
@@ -58,12 +58,12 @@ def clone_oracle(model: PPO, worlds: FollowVecEnv, steps: int, seed: int, epochs
 
 
 def _fit(
-    model: PPO, optimiser: torch.optim.Optimizer, pictures: np.ndarray, labels: np.ndarray, chosen: np.ndarray
+    model: PPO, optimizer: torch.optim.Optimizer, pictures: np.ndarray, labels: np.ndarray, chosen: np.ndarray
 ) -> float:
     inputs: Any = torch.from_numpy(np.ascontiguousarray(pictures[chosen].transpose(0, 3, 1, 2)))
     mean = model.policy.get_distribution(inputs).distribution.mean  # type: ignore[union-attr]
     loss = mse_loss(mean, torch.from_numpy(labels[chosen]))
-    optimiser.zero_grad()
+    optimizer.zero_grad()
     loss.backward()  # type: ignore[no-untyped-call]
-    optimiser.step()
+    optimizer.step()
     return float(loss.detach())

@@ -99,13 +99,13 @@ class Recipe:
 
 @dataclass(frozen=True)
 class PPORecipe(Recipe):
-    """Proximal policy optimisation (Schulman et al., 2017).
+    """Proximal policy optimization (Schulman et al., 2017).
 
     Attributes:
         rollout: steps of each world between updates.
         minibatch: samples of a gradient step.
         epochs: passes over a rollout.
-        gae_lambda: of the generalised advantage estimate.
+        gae_lambda: of the generalized advantage estimate.
         clip_range: of the probability ratio.
         initial_log_std: logarithm of the action's standard deviation at the start.
         cloned_pictures: pictures from which the policy learns the oracle's actions before; 0 = none.

@@ -31,7 +31,7 @@ from baselines.learned.cloning import clone_oracle
 from baselines.learned.evaluation import CURVE_COLUMNS, HELD_SEEDS, SCORES, evaluate
 from baselines.learned.models import load_model, make_model, policy_arrays
 from baselines.learned.recipes import CONTROL_HZ, Domain, PPORecipe, Recipe, SACRecipe
-from tracker.estimators.batch import BatchFilter
+from tracker.estimators.akf_batch import BatchFilter
 
 _CURVE, _CONFIG = "curve.csv", "config.json"
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from baselines.followers.policy import make_follower
+from baselines.followers.build import make_follower
 from baselines.speed.timing import Cost, measure
 from follow_env.envs.follow import FollowEnv
 from follow_env.world.bullet import World

@@ -25,7 +25,7 @@ from follow_env.envs.follow import FollowEnv
 from follow_env.world.bullet import PHYSICS_HZ
 from follow_env.world.kinematic.drive import roll
 from follow_env.world.robots.diff_drive import DiffDrive
-from tracker.estimators.filters import LockOutWarning
+from tracker.estimators import LockOutWarning
 
 CONTROL_HZ = 30
 """Of the environments that are compared."""

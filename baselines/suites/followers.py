@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from baselines.benchmark import provenance as configuration
+from baselines.benchmark import provenance
 from baselines.benchmark.build import UNBIASED, cell_of
 from baselines.benchmark.cells import SCENES, Cell
 from baselines.benchmark.files import Value, write_csv, write_text
+from baselines.benchmark.metrics import episode as metrics
 from baselines.benchmark.metrics.episode import Row
-from baselines.benchmark.metrics.episode import episode as metrics
 from baselines.benchmark.rollout import EpisodeFunction
 from baselines.benchmark.run import Played, rows, run
 from baselines.benchmark.statistics import Score
@@ -82,9 +82,9 @@ def bench(
     counts = {"followers": episodes, "walking_speeds": min(episodes, SPEED_EPISODES)}
     plan = {cell: range(counts[name]) for name, group in studies.items() for cell in group}
     weights = {name: hashlib.sha256(weights_file(name).read_bytes()).hexdigest() for name in agents}
-    settings = {**configuration.settings(calibration), "benchmark": "followers", "agents": weights}
-    digest = configuration.run_digest(settings)
-    config = configuration.text(
+    settings = {**provenance.settings(calibration), "benchmark": "followers", "agents": weights}
+    digest = provenance.run_digest(settings)
+    config = provenance.text(
         settings, digest, studies, {name: list(range(count)) for name, count in counts.items()}, out, jobs
     )
     tasks = [(cell, seed) for cell, seeds in plan.items() for seed in seeds]

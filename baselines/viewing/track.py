@@ -24,14 +24,14 @@ COLUMNS = (
     *("u0", "v0", "u1", "v1", "confidence", "gate_distance", "score", "failures", "age", "confirmations"),
 )
 """Of `tracks.csv`: frames counted from 0, SI units, robot frame; boxes px; empty where there is nothing."""
-COLOURS: dict[State, tuple[int, int, int]] = {
+COLORS: dict[State, tuple[int, int, int]] = {
     "searching": (200, 200, 200),
     "confirming": (240, 228, 66),
     "tracking": (0, 158, 115),
     "coasting": (230, 159, 0),
     "lost": (213, 94, 0),
 }
-"""Okabe-Ito colours of the states in the video."""
+"""Okabe-Ito colors of the states in the video."""
 
 
 def track(
@@ -97,7 +97,7 @@ def track(
         "machine": machine(),
     }
     (out / "config.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    counts = ", ".join(f"{states[state]} {state}" for state in COLOURS if states[state])
+    counts = ", ".join(f"{states[state]} {state}" for state in COLORS if states[state])
     return (
         f"{len(recording.frames)} frames, {skipped} skipped: {counts}; "
         f"{seen.confirmations} confirmed, {'stopped' if seen.alarm else 'not stopped'} at the end.\n"
@@ -136,10 +136,10 @@ def _mot_line(frame: int, seen: Track) -> str:
 
 def _annotated(rgb: np.ndarray, seen: Track) -> np.ndarray:
     """Return the picture with the box, thin where nothing was measured, and a line of text."""
-    image, colour = rgb.copy(), COLOURS[seen.state]
+    image, color = rgb.copy(), COLORS[seen.state]
     if seen.box is not None:
         u0, v0, u1, v1 = (round(value) for value in seen.box)
-        cv2.rectangle(image, (u0, v0), (u1 - 1, v1 - 1), colour, 1 if seen.measurement is None else 2)
+        cv2.rectangle(image, (u0, v0), (u1 - 1, v1 - 1), color, 1 if seen.measurement is None else 2)
     text: str = seen.state
     if seen.distance is not None and seen.bearing is not None:
         text += f"  {seen.distance:.2f} m  {math.degrees(seen.bearing):+.1f} deg"
@@ -148,5 +148,5 @@ def _annotated(rgb: np.ndarray, seen: Track) -> np.ndarray:
     size = max(image.shape[1] / 800.0, 0.35)
     line = round(30 * size)
     cv2.rectangle(image, (0, 0), (image.shape[1], line), (40, 40, 40), -1)
-    cv2.putText(image, text, (4, round(0.72 * line)), cv2.FONT_HERSHEY_SIMPLEX, size, colour, 1, cv2.LINE_AA)
+    cv2.putText(image, text, (4, round(0.72 * line)), cv2.FONT_HERSHEY_SIMPLEX, size, color, 1, cv2.LINE_AA)
     return image

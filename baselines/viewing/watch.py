@@ -15,7 +15,7 @@ import numpy as np
 
 from baselines.benchmark.build import driver, environment_kwargs
 from baselines.benchmark.cells import Cell
-from baselines.followers.policy import TrackingState
+from baselines.followers.tracking_follower import TrackingState
 from baselines.viewing.video import VideoWriter
 from follow_env.camera import PinholeCamera, Renderer, make_renderer
 from follow_env.config import CameraConfig

@@ -1,6 +1,6 @@
 """`PinholeCamera`: intrinsics, and the camera's pose on the robot.
 
-Picture coordinates (u, v) in px from the upper left corner; pixel (i, j) has its centre at (j + 0.5, i + 0.5), the
+Picture coordinates (u, v) in px from the upper left corner; pixel (i, j) has its center at (j + 0.5, i + 0.5), the
 principal point is the middle of the picture. Optical frame: x right, y down, z forward.
 """
 
@@ -12,7 +12,7 @@ from follow_env.config import CameraConfig
 
 @dataclass(frozen=True)
 class CameraPose:
-    """A level camera: position of the optical centre (m) and yaw of its optical axis (rad), world frame."""
+    """A level camera: position of the optical center (m) and yaw of its optical axis (rad), world frame."""
 
     x: float
     y: float

@@ -1,4 +1,4 @@
-"""`TinyRenderer`: PyBullet's software rasteriser behind the `Renderer` interface, a cross-check for the default camera.
+"""`TinyRenderer`: PyBullet's software rasterizer behind the `Renderer` interface, a cross-check for the default camera.
 
 It draws in a client of its own, so that the physics client steps without visual bodies. One directional light stands
 for the scene's lamps; its strength follows the lamps' falloff at the place the camera looks at. People are rigid: each
@@ -40,7 +40,7 @@ class TinyRenderer:
             self._add_primitive(primitive)
         self._people: list[tuple[Mesh, list[int]]] = []
         self._projection = camera.projection_matrix()
-        # TinyRenderer samples a pixel at its lower left corner, not its centre: shift the picture by half a pixel.
+        # TinyRenderer samples a pixel at its lower left corner, not its center: shift the picture by half a pixel.
         self._projection[8] += 1.0 / camera.width
         self._projection[9] += 1.0 / camera.height
 
@@ -94,7 +94,7 @@ class TinyRenderer:
         return owner
 
     def _bodies_of(self, person: Placed) -> list[int]:
-        """Bodies of a person, one for each colour, made when the person is seen for the first time."""
+        """Bodies of a person, one for each color, made when the person is seen for the first time."""
         for mesh, bodies in self._people:
             if mesh is person.mesh:
                 return bodies
@@ -105,10 +105,10 @@ class TinyRenderer:
         for part in (vertices, normals):
             ahead, left = part[:, 0].copy(), part[:, 1].copy()
             part[:, 0], part[:, 1] = cosine * ahead + sine * left, cosine * left - sine * ahead
-        colours, kind = np.unique(person.mesh.colours, axis=0, return_inverse=True)
+        colors, kind = np.unique(person.mesh.colors, axis=0, return_inverse=True)
         bodies = [
-            self._add_mesh(vertices, normals, person.mesh.faces[kind.reshape(-1) == k], colour)
-            for k, colour in enumerate(colours)
+            self._add_mesh(vertices, normals, person.mesh.faces[kind.reshape(-1) == k], color)
+            for k, color in enumerate(colors)
         ]
         self._people.append((person.mesh, bodies))
         return bodies
@@ -117,10 +117,10 @@ class TinyRenderer:
         if isinstance(primitive, Sphere | Capsule):
             straight = primitive.straight if isinstance(primitive, Capsule) else 0.0
             points, normals, faces = _lathe(primitive.radius, straight)
-            self._add_mesh(points + primitive.centre, normals, faces, np.array(primitive.material.colour))
+            self._add_mesh(points + primitive.center, normals, faces, np.array(primitive.material.color))
             return
         client, yaw = self._client, primitive.yaw if isinstance(primitive, Box) else 0.0
-        look = dict(rgbaColor=(*primitive.material.colour, 1.0), specularColor=(0.0, 0.0, 0.0), physicsClientId=client)
+        look = dict(rgbaColor=(*primitive.material.color, 1.0), specularColor=(0.0, 0.0, 0.0), physicsClientId=client)
         if isinstance(primitive, Box):
             half = [0.5 * s for s in primitive.size]
             shape = pybullet.createVisualShape(pybullet.GEOM_BOX, halfExtents=half, **look)
@@ -129,9 +129,9 @@ class TinyRenderer:
                 pybullet.GEOM_CYLINDER, radius=primitive.radius, length=primitive.height, **look
             )
         turn = (0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw))
-        pybullet.createMultiBody(0, -1, shape, primitive.centre, turn, physicsClientId=client)
+        pybullet.createMultiBody(0, -1, shape, primitive.center, turn, physicsClientId=client)
 
-    def _add_mesh(self, vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray, colour: np.ndarray) -> int:
+    def _add_mesh(self, vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray, color: np.ndarray) -> int:
         """Add a mesh by way of an OBJ file: PyBullet loses the memory of meshes that are handed over as lists."""
         lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
         lines += [f"vn {x!r} {y!r} {z!r}" for x, y, z in normals.tolist()]
@@ -142,7 +142,7 @@ class TinyRenderer:
             shape = pybullet.createVisualShape(
                 pybullet.GEOM_MESH,
                 fileName=str(path),
-                rgbaColor=(*colour.tolist(), 1.0),
+                rgbaColor=(*color.tolist(), 1.0),
                 specularColor=(0.0, 0.0, 0.0),
                 physicsClientId=self._client,
             )

@@ -192,10 +192,10 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         if self._pictures is None:
             self._observations = observations.copy()
             return observations, info
-        colours, depth = self._pictures.observed()
+        colors, depth = self._pictures.observed()
         if self._single._obs == "rgbd_uint8":
-            return colours, info | {"depth": depth, "_depth": mask}
-        return {"rgb": colours, "depth": depth, "twist": infos["twist"].astype(np.float32)}, info
+            return colors, info | {"depth": depth, "_depth": mask}
+        return {"rgb": colors, "depth": depth, "twist": infos["twist"].astype(np.float32)}, info
 
     def _outcome(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return fresh arrays for observations, infos, rewards, terminated and truncated."""
@@ -212,7 +212,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
                 "worlds; widen its free lane"
             )
         if self._pictures is not None and not all(self._share(self._pictures.jobs(todo))):
-            raise ValueError("a person has a vertex that is not finite; expected world coordinates in metres")
+            raise ValueError("a person has a vertex that is not finite; expected world coordinates in meters")
 
     def _share(self, jobs: list[Callable[[], Any]]) -> list[Any]:
         """Do the jobs, the first in this thread, and return what they return."""

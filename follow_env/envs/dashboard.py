@@ -1,6 +1,6 @@
 """`Dashboard`: what a person wants to see of an episode: robot's view, depth, plan with both tracks, errors over time.
 
-Colours are Okabe-Ito (person orange, robot blue, estimate green), told apart by shape as well.
+Colors are Okabe-Ito (person orange, robot blue, estimate green), told apart by shape as well.
 """
 
 import math
@@ -88,9 +88,9 @@ class Dashboard:
     def _depth(self) -> np.ndarray:
         assert self._frame is not None
         share = np.clip(self._frame.depth / DEPTH_RANGE, 0.0, 1.0)
-        colours = cv2.applyColorMap((255 * (1.0 - share)).astype(np.uint8), cv2.COLORMAP_VIRIDIS)[:, :, ::-1].copy()
-        colours[self._frame.depth <= 0.0] = 0
-        panel, _, _ = _fit(colours, cv2.INTER_NEAREST)
+        colors = cv2.applyColorMap((255 * (1.0 - share)).astype(np.uint8), cv2.COLORMAP_VIRIDIS)[:, :, ::-1].copy()
+        colors[self._frame.depth <= 0.0] = 0
+        panel, _, _ = _fit(colors, cv2.INTER_NEAREST)
         bar = cv2.applyColorMap(np.linspace(255, 0, 120).astype(np.uint8)[None, :], cv2.COLORMAP_VIRIDIS)
         panel[5:17, PANEL[0] - 165 : PANEL[0] - 45] = bar[:, :, ::-1]
         _text(panel, "0", (PANEL[0] - 178, 16))
@@ -100,9 +100,9 @@ class Dashboard:
     def _map(self) -> np.ndarray:
         panel = self._plan.copy()
         rows = np.array(self._rows)
-        for columns, colour in (((6, 7), PERSON), ((3, 4), ROBOT)):
+        for columns, color in (((6, 7), PERSON), ((3, 4), ROBOT)):
             track = np.array([self._to_plan(x, y) for x, y in rows[:, columns]], np.int32)
-            cv2.polylines(panel, [track.reshape(-1, 1, 2)], False, colour, 2, cv2.LINE_AA)
+            cv2.polylines(panel, [track.reshape(-1, 1, 2)], False, color, 2, cv2.LINE_AA)
         _, _, _, x, y, yaw, px, py, _ = self._rows[-1]
         cv2.circle(panel, self._to_plan(px, py), 5, PERSON, -1, cv2.LINE_AA)
         corners = [(0.35, 0.0), (-0.25, 0.2), (-0.25, -0.2)]
@@ -185,9 +185,9 @@ def _text(panel: np.ndarray, text: str, origin: tuple[int, int], size: float = 0
 def _caption(panel: np.ndarray, text: str, legend: list[tuple[str, tuple[int, int, int]]]) -> np.ndarray:
     _text(panel, text, (8, 20), 0.5)
     right = PANEL[0] - 8
-    for label, colour in reversed(legend):
+    for label, color in reversed(legend):
         right -= 9 * len(label) + 22
-        cv2.rectangle(panel, (right, 10), (right + 12, 20), colour, -1)
+        cv2.rectangle(panel, (right, 10), (right + 12, 20), color, -1)
         _text(panel, label, (right + 17, 20))
     cv2.rectangle(panel, (0, 0), (PANEL[0] - 1, PANEL[1] - 1), GRID, 1)
     return panel
@@ -205,7 +205,7 @@ def _plan(scene: Scene) -> tuple[np.ndarray, Any]:
 
     panel = _blank()
     for primitive in scene.obstacles():
-        x, y, _ = primitive.centre
+        x, y, _ = primitive.center
         if isinstance(primitive, Box):
             c, s = math.cos(primitive.yaw), math.sin(primitive.yaw)
             a, b = 0.5 * primitive.size[0], 0.5 * primitive.size[1]
@@ -259,7 +259,7 @@ def _plot(
         _text(panel, "time (s)", (right - 52, bottom + 29), 0.38)
     _text(panel, label, (left + 6, top + 12), 0.4)
     points = [(t, g) for t, g in zip(time, guess, strict=True) if g is not None]
-    for series, colour, width in ((points, ESTIMATE, 1), (list(zip(time, truth, strict=True)), INK, 2)):
+    for series, color, width in ((points, ESTIMATE, 1), (list(zip(time, truth, strict=True)), INK, 2)):
         if len(series) > 1:
             curve = np.array([at(t, value) for t, value in series], np.int32)
-            cv2.polylines(panel, [curve.reshape(-1, 1, 2)], False, colour, width, cv2.LINE_AA)
+            cv2.polylines(panel, [curve.reshape(-1, 1, 2)], False, color, width, cv2.LINE_AA)

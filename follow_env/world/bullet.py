@@ -163,7 +163,7 @@ class World:
             self._client = -1
 
     def _axle(self, position: tuple[float, float, float]) -> tuple[float, float, float]:
-        """Return the base's centre of mass seen from the axle's middle; z is its height at rest."""
+        """Return the base's center of mass seen from the axle's middle; z is its height at rest."""
         wheels = [
             np.asarray(pybullet.getLinkState(self.robot, j, physicsClientId=self._client)[4]) for j in WHEEL_JOINTS
         ]
@@ -204,7 +204,7 @@ class World:
             lengths=[
                 p.height if isinstance(p, Cylinder) else p.straight if isinstance(p, Capsule) else 0.0 for p in placed
             ],
-            collisionFramePositions=[p.centre for p in placed],
+            collisionFramePositions=[p.center for p in placed],
             collisionFrameOrientations=[(0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw)) for yaw in yaws],
             physicsClientId=client,
         )
@@ -222,7 +222,7 @@ class World:
         )
 
     def _add_robot(self) -> int:
-        """Build the robot; base frame = the chassis' centre of mass, 5 cm behind the axle, 10 cm above the floor."""
+        """Build the robot; base frame = the chassis' center of mass, 5 cm behind the axle, 10 cm above the floor."""
         client, radius, half_track = self._client, self.config.wheel_radius, 0.5 * self.config.track_width
         chassis = pybullet.createCollisionShape(
             pybullet.GEOM_BOX, halfExtents=(0.15, 0.11, 0.05), physicsClientId=client

@@ -1,6 +1,6 @@
 """`Scene`: the immutable geometry of a place. The one source for physics and cameras.
 
-World frame: x along the scene's main direction, y left, z up, floor at z = 0, metres.
+World frame: x along the scene's main direction, y left, z up, floor at z = 0, meters.
 """
 
 import functools
@@ -18,84 +18,84 @@ CELL_REACH = 0.15
 
 @dataclass(frozen=True)
 class Material:
-    """A surface: colour as sRGB in [0, 1], a specular share in [0, 1] and a texture.
+    """A surface: color as sRGB in [0, 1], a specular share in [0, 1] and a texture.
 
-    The textures are named in `camera.raster.textures.TEXTURES`; a renderer without them draws the plain colour.
+    The textures are named in `camera.raster.textures.TEXTURES`; a renderer without them draws the plain color.
     """
 
-    colour: tuple[float, float, float]
+    color: tuple[float, float, float]
     specular: float = 0.1
     texture: str = "plain"
 
 
 @dataclass(frozen=True)
 class Box:
-    """A box: centre (m), full size (m), yaw about z (rad). `solid=False` is decoration without collision."""
+    """A box: center (m), full size (m), yaw about z (rad). `solid=False` is decoration without collision."""
 
-    centre: tuple[float, float, float]
+    center: tuple[float, float, float]
     size: tuple[float, float, float]
     material: Material
     yaw: float = 0.0
     solid: bool = True
 
     def __post_init__(self) -> None:
-        _check(self, (*self.centre, self.yaw), self.size)
+        _check(self, (*self.center, self.yaw), self.size)
 
     @property
     def bottom(self) -> float:
         """Height of the lowest point, m."""
-        return self.centre[2] - 0.5 * self.size[2]
+        return self.center[2] - 0.5 * self.size[2]
 
 
 @dataclass(frozen=True)
 class Cylinder:
-    """An upright cylinder: centre (m), radius (m), height (m)."""
+    """An upright cylinder: center (m), radius (m), height (m)."""
 
-    centre: tuple[float, float, float]
+    center: tuple[float, float, float]
     radius: float
     height: float
     material: Material
     solid: bool = True
 
     def __post_init__(self) -> None:
-        _check(self, self.centre, (self.radius, self.height))
+        _check(self, self.center, (self.radius, self.height))
 
     @property
     def bottom(self) -> float:
         """Height of the lowest point, m."""
-        return self.centre[2] - 0.5 * self.height
+        return self.center[2] - 0.5 * self.height
 
 
 @dataclass(frozen=True)
 class Sphere:
-    """A sphere: centre (m), radius (m)."""
+    """A sphere: center (m), radius (m)."""
 
-    centre: tuple[float, float, float]
+    center: tuple[float, float, float]
     radius: float
     material: Material
     solid: bool = True
 
     def __post_init__(self) -> None:
-        _check(self, self.centre, (self.radius,))
+        _check(self, self.center, (self.radius,))
 
     @property
     def bottom(self) -> float:
         """Height of the lowest point, m."""
-        return self.centre[2] - self.radius
+        return self.center[2] - self.radius
 
 
 @dataclass(frozen=True)
 class Capsule:
-    """An upright capsule: centre (m), radius (m), height from tip to tip (m), greater than the diameter."""
+    """An upright capsule: center (m), radius (m), height from tip to tip (m), greater than the diameter."""
 
-    centre: tuple[float, float, float]
+    center: tuple[float, float, float]
     radius: float
     height: float
     material: Material
     solid: bool = True
 
     def __post_init__(self) -> None:
-        _check(self, self.centre, (self.radius, self.height))
+        _check(self, self.center, (self.radius, self.height))
         if self.height <= 2.0 * self.radius:
             raise ValueError(
                 f"a capsule of radius {self.radius!r} m has the height {self.height!r} m; expected more than the "
@@ -105,7 +105,7 @@ class Capsule:
     @property
     def bottom(self) -> float:
         """Height of the lowest point, m."""
-        return self.centre[2] - 0.5 * self.height
+        return self.center[2] - 0.5 * self.height
 
     @property
     def straight(self) -> float:
@@ -171,8 +171,8 @@ class Scene:
 
     def _distances(self, points: np.ndarray) -> np.ndarray:
         """Return the clearance of each of the points (n, 2), m."""
-        centres, halves, axes, radii = self._footprints
-        offset = points[:, None, :] - centres
+        centers, halves, axes, radii = self._footprints
+        offset = points[:, None, :] - centers
         along = np.abs(offset[..., 0] * axes[:, 0] + offset[..., 1] * axes[:, 1])
         across = np.abs(offset[..., 1] * axes[:, 0] - offset[..., 0] * axes[:, 1])
         gap_x, gap_y = np.maximum(along - halves[:, 0], 0.0), np.maximum(across - halves[:, 1], 0.0)
@@ -193,11 +193,11 @@ class Scene:
 
     @functools.cached_property
     def _footprints(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Centres (n, 2), half sizes (n, 2), cosine and sine of the yaw (n, 2) and rounding radii (n,) of obstacles."""
+        """Centers (n, 2), half sizes (n, 2), cosine and sine of the yaw (n, 2) and rounding radii (n,) of obstacles."""
         rows = {
-            (*p.centre[:2], 0.5 * p.size[0], 0.5 * p.size[1], math.cos(p.yaw), math.sin(p.yaw), 0.0)
+            (*p.center[:2], 0.5 * p.size[0], 0.5 * p.size[1], math.cos(p.yaw), math.sin(p.yaw), 0.0)
             if isinstance(p, Box)
-            else (*p.centre[:2], 0.0, 0.0, 1.0, 0.0, p.radius)
+            else (*p.center[:2], 0.0, 0.0, 1.0, 0.0, p.radius)
             for p in self.obstacles()
         }
         table = np.array(sorted(rows)).reshape(-1, 7)
@@ -214,4 +214,4 @@ class Scene:
 
 def _check(primitive: Primitive, place: tuple[float, ...], lengths: tuple[float, ...]) -> None:
     if not (all(map(math.isfinite, (*place, *lengths))) and min(lengths) > 0.0):
-        raise ValueError(f"{primitive!r} cannot be; expected finite metres and radians, and sizes > 0")
+        raise ValueError(f"{primitive!r} cannot be; expected finite meters and radians, and sizes > 0")

@@ -1,4 +1,4 @@
-"""A detector that knows the colours of the suits: cheap, never trained, the same everywhere.
+"""A detector that knows the colors of the suits: cheap, never trained, the same everywhere.
 
 A module of its own, because worker processes must be able to import it.
 """
@@ -14,7 +14,7 @@ from tracker.person_tracker import Detector
 
 @dataclass
 class SuitDetector:
-    """Finds what is more coloured than so many grey levels; after so many pictures somebody presses Ctrl-C."""
+    """Finds what is more colored than so many gray levels; after so many pictures somebody presses Ctrl-C."""
 
     least: int
     patience: int = 1_000_000
@@ -23,8 +23,8 @@ class SuitDetector:
         if self.patience == 0:
             raise KeyboardInterrupt
         self.patience -= 1
-        colours = rgb.astype(np.int16)
-        vivid = colours.max(axis=2) - colours.min(axis=2) > self.least
+        colors = rgb.astype(np.int16)
+        vivid = colors.max(axis=2) - colors.min(axis=2) > self.least
         vivid[:, :60] = vivid[:, 260:] = False  # handrails and hoses
         rows, columns = (np.flatnonzero(np.count_nonzero(vivid, axis=axis) > 5) for axis in (1, 0))
         if not (rows.size and columns.size):

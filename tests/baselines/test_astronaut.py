@@ -11,7 +11,7 @@ import torch
 
 from baselines.benchmark.run import Interrupted
 from baselines.benchmark.store import InputError
-from baselines.cli.main import main as cli
+from baselines.cli import main as cli
 from baselines.papers.zhang2018 import table2, table3
 from baselines.papers.zhang2018.experiments import EXPERIMENTS, tasks
 from baselines.papers.zhang2018.nets import Nets

@@ -8,7 +8,7 @@ import pytest
 
 from baselines.followers import calibration
 from baselines.papers.dong2018 import calibrate
-from baselines.papers.dong2018.calibrate import DT, _fit, _summarise
+from baselines.papers.dong2018.calibrate import DT, _fit, _summarize
 from follow_env.camera.measurement import MeasurementModel
 from follow_env.config import MeasurementConfig
 from tracker.depth import RULES
@@ -44,7 +44,7 @@ def play(config, episodes, steps=2000):
 
 @pytest.fixture(scope="module")
 def summary():
-    return _summarise(play(CONFIG, 30))["grid_mean"]
+    return _summarize(play(CONFIG, 30))["grid_mean"]
 
 
 def test_the_errors_that_went_in_are_found_again(summary):

@@ -16,7 +16,7 @@ import pytest
 
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.store import FILE_NAME
-from baselines.cli.main import main as cli
+from baselines.cli import main as cli
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLLOW = [sys.executable, "-m", "baselines.cli.main"]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from baselines.benchmark import provenance as configuration
+from baselines.benchmark import provenance
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.files import write_csv
 from baselines.benchmark.provenance import Plan
@@ -75,7 +75,7 @@ def test_it_was_made_with_these_settings():
     config = json.loads((RUN / "config.json").read_text(encoding="utf-8"))
     plan = Plan.of(["emulated", "mask"], None, calibration.family())
 
-    assert config["settings_sha256"] == configuration.digest(configuration.settings(calibration.settings()))
+    assert config["settings_sha256"] == provenance.digest(provenance.settings(calibration.settings()))
     assert config["cells"]["table1"] == [cell.key for cell in plan.table]
     assert {name: len(seeds) for name, seeds in config["seeds"]["studies"].items()} == {
         name: len(plan.study_seeds(name)) for name in plan.studies

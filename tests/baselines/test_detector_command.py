@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from baselines.cli.main import main as cli
+from baselines.cli import main as cli
 
 ROOT = Path(__file__).resolve().parents[2]
 

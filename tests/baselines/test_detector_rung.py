@@ -1,4 +1,4 @@
-"""The `detector` rung in closed loop, with a detector that knows nothing but the colour of the person's shirt."""
+"""The `detector` rung in closed loop, with a detector that knows nothing but the color of the person's shirt."""
 
 import csv
 import dataclasses
@@ -12,14 +12,15 @@ import pytest
 
 from baselines.benchmark import build as assembly
 from baselines.benchmark.cells import Cell, table1_cells
-from baselines.benchmark.metrics.episode import tracking
+from baselines.benchmark.metrics import tracking
 from baselines.benchmark.metrics.tracking import TrackingMetrics
 from baselines.benchmark.provenance import Plan
 from baselines.benchmark.rollout import Player
-from baselines.cli.main import main as cli
+from baselines.cli import main as cli
 from baselines.followers import policy
+from baselines.followers.build import make_follower
 from baselines.followers.calibration import NoiseModel
-from baselines.followers.policy import LOOK_RATE, make_follower
+from baselines.followers.tracking_follower import LOOK_RATE
 from baselines.papers.dong2018 import calibrate, figures
 from baselines.papers.dong2018.calibrate import DT, error_statistics
 from baselines.papers.dong2018.calibrate_detector import tracked_errors

@@ -10,7 +10,7 @@ from follow_env import IDS
 
 @pytest.mark.parametrize("scene", IDS)
 def test_the_kinematic_robot_goes_where_pybullets_goes(scene):
-    """Within 2 cm and 0.5 deg over windows of 2 s; without restart a few centimetres after 14 s."""
+    """Within 2 cm and 0.5 deg over windows of 2 s; without restart a few centimeters after 14 s."""
     result = motion(scene, range(2))
     assert 1e-5 < result.position < 0.02
     assert 0.0 < result.yaw < math.radians(0.5)

@@ -5,7 +5,7 @@ import pytest
 from baselines.benchmark.build import driver, environment
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.rollout import play
-from baselines.followers.policy import make_follower
+from baselines.followers.build import make_follower
 from follow_env.envs.follow import FollowEnv
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.metrics.episode import COLUMNS, EpisodeMetrics, Row, quantile
-from tracker.estimators.filters import Estimate
+from tracker.estimators import Estimate
 
 CELL = Cell("emulated", "indoor", "akf")
 DT = 1.0 / 30.0

@@ -94,7 +94,7 @@ def test_proportional_gain_alone_leaves_an_error():
     ("bearing", "distance", "turns", "drives"),
     [(0.2, 1.5, 1, 0), (-0.2, 1.5, -1, 0), (0.0, 2.0, 0, 1), (0.0, 1.0, 0, -1)],
 )
-def test_the_robot_turns_and_drives_towards_the_set_point(bearing, distance, turns, drives):
+def test_the_robot_turns_and_drives_toward_the_set_point(bearing, distance, turns, drives):
     v, omega = PIController.from_paper().command(bearing, distance, DT)
     assert (np.sign(omega), np.sign(v)) == (turns, drives)
 

@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 
 import follow_env
+from baselines.followers.build import make_follower
 from baselines.followers.calibration import NoiseModel
-from baselines.followers.policy import Follower, make_follower, make_perception, perceive_measurement
-from tracker.estimators.filters import NoFilter
+from baselines.followers.follower import Follower
+from baselines.followers.perception import make_perception, perceive_measurement
+from tracker.estimators import NoFilter
 
 NOISE = NoiseModel((1e-4, 1e-2), (1e-4, 1e-3), (1e-2, 1e-1))
 
@@ -91,7 +93,7 @@ def test_actions_stay_in_the_action_space():
 @pytest.mark.parametrize("scene", follow_env.IDS)
 @pytest.mark.parametrize("perception", ["truth", "emulated", "mask"])
 def test_every_perception_reads_its_observation_and_agrees_with_the_truth(perception, scene):
-    from baselines.followers.policy import OBSERVATION_OF
+    from baselines.followers.perception import OBSERVATION_OF
 
     env = gym.make(follow_env.IDS[scene], obs=OBSERVATION_OF[perception], sensor="ideal", disable_env_checker=True)
     obs, info = env.reset(seed=3)

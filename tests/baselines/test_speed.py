@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from baselines import speed
-from baselines.cli.main import main as cli
+from baselines.cli import main as cli
 from baselines.speed import frames, pair, timing
 from baselines.speed.batch import PEER, BatchRate
 from baselines.speed.frames import FrameCost

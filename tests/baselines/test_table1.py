@@ -18,7 +18,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from baselines.benchmark import provenance as configuration
+from baselines.benchmark import provenance
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.files import write_text
 from baselines.benchmark.provenance import Plan, digest, settings
@@ -277,11 +277,11 @@ def test_the_hash_covers_what_changes_results_and_nothing_else() -> None:
 
 def test_another_version_of_the_code_is_another_run(monkeypatch: pytest.MonkeyPatch) -> None:
     base = settings({"r": 1.0})
-    before = configuration.run_digest(base)
+    before = provenance.run_digest(base)
     assert before != digest(base)
     read_bytes = Path.read_bytes
     monkeypatch.setattr(Path, "read_bytes", lambda path: read_bytes(path) + b"#" * (path.name == "filters.py"))
-    assert configuration.run_digest(base) != before
+    assert provenance.run_digest(base) != before
 
 
 def test_raw_rows_read_back_as_the_very_floats(synthetic: ModuleType, finished: Path) -> None:

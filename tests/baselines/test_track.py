@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from baselines.cli.main import main as cli
+from baselines.cli import main as cli
 from baselines.viewing.track import COLUMNS, track
 from follow_env.envs.follow import FollowEnv
 from tracker.boxes import Detection

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from baselines.followers.policy import LOOK_RATE, TrackingFollower, make_follower
+from baselines.followers.build import make_follower
+from baselines.followers.tracking_follower import LOOK_RATE, TrackingFollower
 from follow_env.config import CameraConfig, RobotConfig
 from follow_env.envs.follow import FollowEnv
 from tracker.boxes import Detection

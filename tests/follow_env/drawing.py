@@ -13,12 +13,12 @@ from follow_env.world.people.mesh import Mesh, Placed
 from follow_env.world.scene import Box, Capsule, Cylinder, Light, Material, Scene, Sphere
 
 SMALL = PinholeCamera(CameraConfig(width=160, height=120))
-GREY, RED = Material((0.5, 0.5, 0.5)), Material((0.7, 0.2, 0.1))
+GRAY, RED = Material((0.5, 0.5, 0.5)), Material((0.7, 0.2, 0.1))
 LAMPS = (Light((1.0, 0.5, 2.6), 0.8), Light((6.0, -1.0, 2.4), 0.5))
 
 
 def scene(*primitives, lights=LAMPS):
-    return Scene("test", primitives, GREY, lights, 0.3, (-20.0, 20.0, -20.0, 20.0))
+    return Scene("test", primitives, GRAY, lights, 0.3, (-20.0, 20.0, -20.0, 20.0))
 
 
 def blob(x, y, z, radius=(0.25, 0.3, 0.8), id=1, pattern=0, rows=9, sides=12, open_rows=0):
@@ -43,13 +43,13 @@ def blob(x, y, z, radius=(0.25, 0.3, 0.8), id=1, pattern=0, rows=9, sides=12, op
     points = np.array([[d * r for d, r in zip(direction, radius, strict=True)] for direction in directions])
     slopes = np.array([[d / r for d, r in zip(direction, radius, strict=True)] for direction in directions])
     normals = slopes / np.sqrt((slopes * slopes).sum(axis=1, keepdims=True))
-    colours = np.array([(0.2 + 0.6 * (f % 3 == 0), 0.4, 0.7) for f in range(len(faces))], np.float32)
-    mesh = Mesh(np.array(faces, np.int32), colours, np.full(len(faces), pattern, np.uint8), points.astype(np.float32))
+    colors = np.array([(0.2 + 0.6 * (f % 3 == 0), 0.4, 0.7) for f in range(len(faces))], np.float32)
+    mesh = Mesh(np.array(faces, np.int32), colors, np.full(len(faces), pattern, np.uint8), points.astype(np.float32))
     return Placed(mesh, (points + np.array((x, y, z))).astype(np.float32), normals.astype(np.float32), id)
 
 
 def reference(place, camera, pose, people=()):
-    """Cast a ray through every pixel centre; return depth, ids, normals (H, W, 3), albedo and points, in float64.
+    """Cast a ray through every pixel center; return depth, ids, normals (H, W, 3), albedo and points, in float64.
 
     A box is met by the slab test in its own frame, a cylinder by the quadratic and its ends, a sphere or capsule by
     walking along the ray by the distance to its surface, a triangle by Cramer's rule. What lies nearer than `near`
@@ -64,9 +64,9 @@ def reference(place, camera, pose, people=()):
     depth, ids = np.full(u.shape, far), np.zeros(u.shape, int)
     normals, albedo = np.zeros((*u.shape, 3)), np.zeros((*u.shape, 3))
 
-    def meet(t, hit, normal, colour, id):
+    def meet(t, hit, normal, color, id):
         closer = hit & (t >= near) & (t < depth)
-        depth[closer], ids[closer], albedo[closer] = t[closer], id, colour
+        depth[closer], ids[closer], albedo[closer] = t[closer], id, color
         normal = np.broadcast_to(normal, normals.shape)
         normals[closer] = (normal * -np.sign((normal * rays).sum(axis=-1, keepdims=True)))[closer]
 
@@ -82,7 +82,7 @@ def reference(place, camera, pose, people=()):
                         (0.0, 0.0, 1.0),
                     ]
                 )
-                own, own_rays = frame @ (eye - p.centre), rays @ frame.T
+                own, own_rays = frame @ (eye - p.center), rays @ frame.T
                 half = 0.5 * np.array(p.size)
                 first, second = (-half - own) / own_rays, (half - own) / own_rays
                 enter, leave = np.minimum(first, second), np.maximum(first, second)
@@ -90,34 +90,34 @@ def reference(place, camera, pose, people=()):
                 ends = (enter.max(axis=-1), enter.argmax(axis=-1)), (leave.min(axis=-1), leave.argmin(axis=-1))
                 for t, axis in ends:
                     way = np.take_along_axis(own_rays, axis[..., None], axis=-1)
-                    meet(t, hit, -np.sign(way) * frame[axis], p.material.colour, 0)
+                    meet(t, hit, -np.sign(way) * frame[axis], p.material.color, 0)
             elif isinstance(p, Sphere | Capsule):
                 t, outward = walk(p, eye, rays, near)
-                meet(t, t < far, outward, p.material.colour, 0)
+                meet(t, t < far, outward, p.material.color, 0)
             else:
-                offset, half = eye - p.centre, 0.5 * p.height
+                offset, half = eye - p.center, 0.5 * p.height
                 a = rays[..., 0] ** 2 + rays[..., 1] ** 2
                 b = rays[..., 0] * offset[0] + rays[..., 1] * offset[1]
                 root = np.sqrt(b * b - a * (offset[0] ** 2 + offset[1] ** 2 - p.radius**2))
                 for t in ((-b - root) / a, (-b + root) / a):
                     point = offset + t[..., None] * rays
                     outward = np.stack([point[..., 0], point[..., 1], np.zeros_like(t)], axis=-1) / p.radius
-                    meet(t, np.abs(point[..., 2]) <= half, outward, p.material.colour, 0)
+                    meet(t, np.abs(point[..., 2]) <= half, outward, p.material.color, 0)
                 for end in (half, -half):
                     t = (end - offset[2]) / rays[..., 2]
                     point = offset + t[..., None] * rays
                     hit = point[..., 0] ** 2 + point[..., 1] ** 2 <= p.radius**2
-                    meet(t, hit, (0.0, 0.0, math.copysign(1.0, end)), p.material.colour, 0)
+                    meet(t, hit, (0.0, 0.0, math.copysign(1.0, end)), p.material.color, 0)
         for person in people:
             corners = person.vertices.astype(float)[person.mesh.faces] - eye
-            for (p0, p1, p2), colour in zip(corners, person.mesh.colours, strict=True):
+            for (p0, p1, p2), color in zip(corners, person.mesh.colors, strict=True):
                 normal = np.cross(p1 - p0, p2 - p0)
                 t = normal @ p0 / (rays @ normal)
                 q = t[..., None] * rays
                 hit = (rays @ normal) < 0.0
                 for start, stop in ((p0, p1), (p1, p2), (p2, p0)):
                     hit &= np.cross(stop - start, q - start) @ normal >= 0.0
-                meet(t, hit, normal / np.linalg.norm(normal), colour, person.id)
+                meet(t, hit, normal / np.linalg.norm(normal), color, person.id)
     return depth, ids, normals, albedo, eye + depth[..., None] * rays
 
 
@@ -130,7 +130,7 @@ def walk(solid, eye, rays, near):
     t = np.full(rays.shape[:2], near)
     length = np.sqrt((rays**2).sum(axis=-1))
     for step in range(66):
-        offset = eye + t[..., None] * rays - solid.centre
+        offset = eye + t[..., None] * rays - solid.center
         offset[..., 2] -= np.clip(offset[..., 2], -half, half)
         distance = np.sqrt((offset**2).sum(axis=-1))
         gap = distance - solid.radius
@@ -141,7 +141,7 @@ def walk(solid, eye, rays, near):
 
 
 def flat(depth, slack=0.03):
-    """Where the depth is smooth: no neighbour (3 x 3) differs by more than `slack` of it (at least of 1 m)."""
+    """Where the depth is smooth: no neighbor (3 x 3) differs by more than `slack` of it (at least of 1 m)."""
     depth = depth.astype(np.float32)
     window = np.ones((3, 3), np.uint8)
     return cv2.dilate(depth, window) - cv2.erode(depth, window) <= slack * np.maximum(depth, 1.0)

@@ -13,7 +13,7 @@ from follow_env.world.people.bodies import load_body
 from follow_env.world.people.walker import Walker
 from follow_env.world.scene import Box, Light, Material, Scene
 
-GREY = Material((0.5, 0.5, 0.5))
+GRAY = Material((0.5, 0.5, 0.5))
 LAMP = (Light((0.0, 0.0, 3.0), 1.0),)
 CAMERA = PinholeCamera(CameraConfig())
 SMALL = PinholeCamera(CameraConfig(width=80, height=60))
@@ -26,7 +26,7 @@ WALKERS = {outfit: Walker(load_body("man", outfit)) for outfit in ("blue", "gree
 
 
 def scene(*boxes):
-    return Scene("test", boxes, GREY, LAMP, 0.5, (-20.0, 20.0, -20.0, 20.0))
+    return Scene("test", boxes, GRAY, LAMP, 0.5, (-20.0, 20.0, -20.0, 20.0))
 
 
 @pytest.fixture(params=RENDERERS)
@@ -55,8 +55,8 @@ def world_point(pose, ahead, left, up):
 
 def plate(pose, ahead, left, up, size=0.3):
     """A thin square plate that faces the camera, with its front at the given place."""
-    centre = world_point(pose, ahead + 0.0005, left, up)
-    return Box(centre, (0.001, size, size), GREY, yaw=pose.yaw)
+    center = world_point(pose, ahead + 0.0005, left, up)
+    return Box(center, (0.001, size, size), GRAY, yaw=pose.yaw)
 
 
 @pytest.mark.parametrize("pose", POSES.values(), ids=POSES)
@@ -65,9 +65,9 @@ def plate(pose, ahead, left, up, size=0.3):
     [(2.0, 0.0, 0.0), (2.5, 0.8, 0.5), (2.5, -0.8, -0.3), (4.0, 1.2, -0.6), (6.0, -2.0, 1.2)],
 )
 def test_a_point_appears_where_the_intrinsics_say(picture, pose, ahead, left, up):
-    """The centroid of a plate's pixels is the projection of its centre: within half a pixel, and 5 mm of depth.
+    """The centroid of a plate's pixels is the projection of its center: within half a pixel, and 5 mm of depth.
 
-    A plate that faces the camera is imaged without distortion, so its centroid is the image of its centre; a rectangle
+    A plate that faces the camera is imaged without distortion, so its centroid is the image of its center; a rectangle
     covers whole rows and columns, which leaves half a pixel on each axis. The next test averages that away.
     """
     empty = picture(CAMERA, pose, ())
@@ -114,9 +114,9 @@ def test_left_is_left_and_up_is_up():
 
 @pytest.mark.parametrize("pose", POSES.values(), ids=POSES)
 @pytest.mark.parametrize("distance", [0.6, 1.5, 3.0, 7.5, 15.0])
-def test_a_wall_ahead_has_its_distance_in_metres(picture, pose, distance):
+def test_a_wall_ahead_has_its_distance_in_meters(picture, pose, distance):
     """To 1 cm as asked of every renderer; the depth is along the optical axis, so the whole wall reads alike."""
-    wall = Box(world_point(pose, distance + 0.05, 0.0, 0.0), (0.1, 40.0, 40.0), GREY, yaw=pose.yaw)
+    wall = Box(world_point(pose, distance + 0.05, 0.0, 0.0), (0.1, 40.0, 40.0), GRAY, yaw=pose.yaw)
     frame = picture(SMALL, pose, (wall,))
     upper = frame.depth[: SMALL.height // 2]
     assert upper == pytest.approx(distance, abs=0.01)
@@ -173,7 +173,7 @@ def test_the_persons_pixels_fill_the_projection_of_the_body(picture, pose, ahead
     assert set(np.unique(frame.ids)) == {0, 1}
 
 
-def test_the_persons_pixels_have_the_persons_depth_and_colour(picture):
+def test_the_persons_pixels_have_the_persons_depth_and_color(picture):
     pose = POSES["origin"]
     x, y, _ = world_point(pose, 2.0, 0.0, 0.0)
     frames = {outfit: picture(CAMERA, pose, (), standing(x, y, outfit)) for outfit in WALKERS}
@@ -193,7 +193,7 @@ def test_a_person_who_is_not_in_view_has_no_pixels(picture):
     behind = standing(-2.0, 0.0)
     beside = standing(1.0, 2.0)
     ahead = standing(3.0, 0.0)
-    wall = Box((1.5, 0.0, 1.0), (0.1, 6.0, 4.0), GREY)
+    wall = Box((1.5, 0.0, 1.0), (0.1, 6.0, 4.0), GRAY)
     assert picture(SMALL, pose, (), behind).person_box() is None
     assert picture(SMALL, pose, (), beside).person_box() is None
     assert picture(SMALL, pose, (), ahead).person_box() is not None

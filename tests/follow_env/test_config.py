@@ -15,7 +15,7 @@ from follow_env.config import (
     SENSORS,
     BoxConfig,
     CameraConfig,
-    ColourConfig,
+    ColorConfig,
     DepthConfig,
     FrameConfig,
     MeasurementConfig,
@@ -27,7 +27,7 @@ from follow_env.config import (
 )
 
 CONFIGS = (
-    *(RobotConfig, CameraConfig, DepthConfig, ColourConfig, FrameConfig, BoxConfig, MeasurementConfig),
+    *(RobotConfig, CameraConfig, DepthConfig, ColorConfig, FrameConfig, BoxConfig, MeasurementConfig),
     SensorConfig,
 )
 
@@ -97,8 +97,8 @@ def test_the_default_of_a_mapping_is_the_default_sensor():
 
 
 def test_a_mapping_may_start_from_a_preset():
-    harsher = sensor_config({"preset": "xtion_harsh", "colour": {"blur": 3.0}})
-    assert harsher == dataclasses.replace(HARSH_SENSOR, colour=dataclasses.replace(HARSH_SENSOR.colour, blur=3.0))
+    harsher = sensor_config({"preset": "xtion_harsh", "color": {"blur": 3.0}})
+    assert harsher == dataclasses.replace(HARSH_SENSOR, color=dataclasses.replace(HARSH_SENSOR.color, blur=3.0))
     assert sensor_config({"preset": "ideal"}) == IDEAL_SENSOR
 
 
@@ -130,7 +130,7 @@ def test_numbers_from_numpy_are_numbers():
         ({"sensor": {"measurment": {}}}, ("'measurment'", "did you mean 'measurement'")),
         ({"sensor": {"measurement": {"mis_share": 0.1}}}, ("'mis_share'", "did you mean 'miss_share'")),
         ({"sensor": {"preset": "ideel"}}, ("'ideel'", "did you mean 'ideal'")),
-        ({"sensor": {"colour": {"blurr": 1.0}}}, ("'blurr'", "did you mean 'blur'")),
+        ({"sensor": {"color": {"blurr": 1.0}}}, ("'blurr'", "did you mean 'blur'")),
         ({"sensor": {"depth": {"axial_nose": 1.0}}}, ("'axial_nose'", "did you mean 'axial_noise'")),
     ],
     ids=lambda value: str(value) if isinstance(value, dict) else "",
@@ -194,12 +194,12 @@ def test_a_name_like_no_other_is_refused_without_a_guess():
         ({"sensor": {"depth": {"dark_level": 0.0}}}, "0.0"),
         ({"sensor": {"depth": {"grazing_deg": 90.0}}}, "90.0"),
         ({"sensor": {"depth": {"grazing_dropout": 2.0}}}, "2.0"),
-        ({"sensor": {"colour": {"read_noise": -1.0}}}, "-1.0"),
-        ({"sensor": {"colour": {"shot_noise": math.inf}}}, "inf"),
-        ({"sensor": {"colour": {"blur": 51.0}}}, "51.0"),
-        ({"sensor": {"colour": {"gain": -0.5}}}, "-0.5"),
+        ({"sensor": {"color": {"read_noise": -1.0}}}, "-1.0"),
+        ({"sensor": {"color": {"shot_noise": math.inf}}}, "inf"),
+        ({"sensor": {"color": {"blur": 51.0}}}, "51.0"),
+        ({"sensor": {"color": {"gain": -0.5}}}, "-0.5"),
         ({"sensor": {"frames": {"drop_share": 1.0}}}, "1.0"),
-        ({"sensor": {"box": {"centre_jitter": -0.1}}}, "-0.1"),
+        ({"sensor": {"box": {"center_jitter": -0.1}}}, "-0.1"),
         ({"sensor": {"box": {"size_jitter": math.inf}}}, "inf"),
         ({"sensor": {"box": {"correlation_s": -0.1}}}, "-0.1"),
         ({"sensor": {"measurement": {"miss_share": 1.0}}}, "1.0"),

@@ -206,7 +206,7 @@ def test_a_weak_motor_accelerates_as_its_torque_allows(torque):
     assert odometry[-1, 0] < 0.8, "the speed limit ends the acceleration, so this test proves nothing"
 
 
-def test_a_parked_robot_creeps_by_less_than_a_millimetre_per_second(world):
+def test_a_parked_robot_creeps_by_less_than_a_millimeter_per_second(world):
     """Few solver iterations leave a residue of the contact forces; a whole episode of it must not matter."""
     poses, odometry = drive(world, (0.0, 0.0), 14.0, (1.0, -2.0, 0.7))
     assert np.abs(poses - (1.0, -2.0, 0.7)).max() < 0.014

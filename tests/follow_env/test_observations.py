@@ -107,7 +107,7 @@ def test_the_age_of_a_measurement_is_the_time_since_it_was_taken(make, episode):
 
 
 def test_the_box_is_the_persons_box_with_the_stated_jitter(make):
-    """Around the tight box of the mask; centre and size err by their shares of width and height."""
+    """Around the tight box of the mask; center and size err by their shares of width and height."""
     env = make(INDOOR, obs="rgbd_box", route="standing", sensor={"box": {"correlation_s": 0.0}})
     observation, _ = env.reset(seed=0, options={"robot_pose": (-2.5, 0.0, 0.0)})
     tight = np.array(env.frame().person_box())

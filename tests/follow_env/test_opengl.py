@@ -25,7 +25,7 @@ from follow_env.world.scene import Box, Capsule, Cylinder, Light, Material, Scen
 from follow_env.world.scenes import SCENES, make_scene
 
 SMALL = PinholeCamera(CameraConfig(width=160, height=120))
-GREY = Material((0.5, 0.5, 0.5))
+GRAY = Material((0.5, 0.5, 0.5))
 LAMPS = (Light((1.0, 0.5, 2.6), 0.8), Light((6.0, -1.0, 2.4), 0.5))
 EYE = CameraPose(0.0, 0.0, 1.0, 0.0)
 
@@ -49,7 +49,7 @@ def draw():
         renderer.close()
 
 
-def scene(*primitives, floor=GREY, lights=LAMPS):
+def scene(*primitives, floor=GRAY, lights=LAMPS):
     return Scene("test", primitives, floor, lights, 0.3, (-20.0, 20.0, -20.0, 20.0))
 
 
@@ -77,7 +77,7 @@ def views(place, count):
 
 
 def inside(frame):
-    """Pixels with no silhouette in their 3 x 3 neighbourhood."""
+    """Pixels with no silhouette in their 3 x 3 neighborhood."""
     window = np.ones((3, 3), np.uint8)
     jump = cv2.dilate(frame.depth, window) - cv2.erode(frame.depth, window)
     same = cv2.dilate(frame.ids, window) == cv2.erode(frame.ids, window)
@@ -85,29 +85,29 @@ def inside(frame):
 
 
 def compare(frames):
-    """Return the shares of depths within 1 cm and ids that agree, and the mean difference in grey levels."""
-    close, colours, both, either = [], [], 0, 0
+    """Return the shares of depths within 1 cm and ids that agree, and the mean difference in gray levels."""
+    close, colors, both, either = [], [], 0, 0
     for a, b in frames:
         assert b.rgb.dtype == np.uint8
         assert b.depth.dtype == np.float32
         assert b.ids.dtype == np.uint8
         where = inside(a)
         close.append((np.abs(a.depth - b.depth) <= 0.01)[where])
-        colours.append(np.abs(a.rgb.astype(int) - b.rgb)[where].ravel())
+        colors.append(np.abs(a.rgb.astype(int) - b.rgb)[where].ravel())
         both, either = both + int(((a.ids == b.ids) & (a.ids > 0)).sum()), either + int(((a.ids | b.ids) > 0).sum())
     assert either > 5000
-    return np.concatenate(close).mean(), both / either, np.concatenate(colours).mean()
+    return np.concatenate(close).mean(), both / either, np.concatenate(colors).mean()
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_agrees_with_the_default_camera(name, draw):
-    """50 random views of each scene: depth, ids and colours, textures and a person in mid-step included."""
+    """50 random views of each scene: depth, ids and colors, textures and a person in mid-step included."""
     place = make_scene(name)
     theirs, ours = RasterRenderer(place, SMALL), draw(place)
-    close, iou, grey = compare([(theirs.render(p, [who]), ours.render(p, [who])) for p, who in views(place, 50)])
+    close, iou, gray = compare([(theirs.render(p, [who]), ours.render(p, [who])) for p, who in views(place, 50)])
     assert close > 0.995
     assert iou > 0.99
-    assert grey < 0.5
+    assert gray < 0.5
 
 
 def test_every_solid_texture_and_pattern_agrees(draw):
@@ -121,21 +121,21 @@ def test_every_solid_texture_and_pattern_agrees(draw):
     camera = PinholeCamera(CameraConfig(width=320, height=240, hfov_deg=70.0))
     theirs, ours = RasterRenderer(place, camera), draw(place, camera)
     poses = [EYE, CameraPose(8.0, 0.5, 1.6, 3.0), CameraPose(4.5, -4.0, 0.7, 1.5)]
-    close, iou, grey = compare([(theirs.render(p, people), ours.render(p, people)) for p in poses])
+    close, iou, gray = compare([(theirs.render(p, people), ours.render(p, people)) for p in poses])
     assert close > 0.995
     assert iou > 0.99
-    assert grey < 0.6
+    assert gray < 0.6
 
 
 def test_a_camera_inside_a_solid_sees_it_from_inside(draw):
-    for solid in (Box((0, 0, 1), (1.5, 2.5, 1.2), GREY, 0.4), Cylinder((0, 0, 1), 0.8, 1.2, GREY)):
+    for solid in (Box((0, 0, 1), (1.5, 2.5, 1.2), GRAY, 0.4), Cylinder((0, 0, 1), 0.8, 1.2, GRAY)):
         place = scene(solid)
         theirs, ours = RasterRenderer(place, SMALL).render(EYE), draw(place).render(EYE)
         assert np.abs(theirs.depth - ours.depth).max() < 0.005
         assert np.abs(theirs.rgb.astype(int) - ours.rgb).mean() < 1.0
 
 
-def test_supersampling_averages_colours_and_nothing_else(draw):
+def test_supersampling_averages_colors_and_nothing_else(draw):
     place, person = make_scene("indoor"), somebody()
     sizes = [(160, 120, 1), (160, 120, 2), (320, 240, 1)]
     plain, smooth, double = (
@@ -151,7 +151,7 @@ def test_supersampling_averages_colours_and_nothing_else(draw):
 
 def test_shadows_lie_where_the_lamp_cannot_see(draw):
     """A plate in the air darkens the floor behind it, seen from the lamp, to its bounced light; and nothing else."""
-    lamp, plate = (3.0, 0.4, 2.5), Box((3.2, 0.0, 1.2), (0.8, 0.6, 0.02), GREY)
+    lamp, plate = (3.0, 0.4, 2.5), Box((3.2, 0.0, 1.2), (0.8, 0.6, 0.02), GRAY)
     place = scene(plate, lights=(Light(lamp, 0.6),))
     camera = PinholeCamera(CameraConfig(width=320, height=240))
     bright, dark = (draw(place, camera, shadows).render(EYE) for shadows in (False, True))

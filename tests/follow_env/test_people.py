@@ -55,13 +55,13 @@ def edges(faces: np.ndarray) -> np.ndarray:
     return np.unique(pairs, axis=0)
 
 
-def test_assets_are_small_and_come_with_their_licences():
+def test_assets_are_small_and_come_with_their_licenses():
     files = sorted(path.stem for path in ASSETS.glob("*.npz"))
     assert files == sorted([*BODIES, "gait"])
     assert all(path.stat().st_size < 60_000 for path in ASSETS.glob("*.npz"))
     assert "CC0 1.0 Universal" in (ASSETS / "LICENSE-CC0.md").read_text()
-    licences = (ASSETS / "LICENCES.md").read_text()
-    assert all(f"`{name}.npz`" in licences for name in files)
+    licenses = (ASSETS / "LICENSES.md").read_text()
+    assert all(f"`{name}.npz`" in licenses for name in files)
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -72,8 +72,8 @@ def test_body_is_well_formed(name: str, detail: str):
     low, high = {"low": (1100, 1350), "high": (2800, 3300)}[detail]
     assert low <= len(mesh.faces) <= high
     assert np.array_equal(np.unique(mesh.faces), np.arange(len(rest)))
-    assert mesh.colours.shape == (len(mesh.faces), 3)
-    assert len(np.unique(mesh.colours, axis=0)) == len(MATERIALS)
+    assert mesh.colors.shape == (len(mesh.faces), 3)
+    assert len(np.unique(mesh.colors, axis=0)) == len(MATERIALS)
     assert np.abs(body.weights.sum(axis=1) - 1.0).max() < 1e-6
     assert body.weights.min() >= 0.0
     assert body.parents[0] == -1
@@ -97,7 +97,7 @@ def test_surfaces_face_outward(walkers):
         placed = walker.place(0.0, 0.0, 0.0, 0.0, 0.0, "stand")
         a, b, c = (placed.vertices[placed.mesh.faces[:, k]].astype(float) for k in range(3))
         volume = float((a * np.cross(b, c)).sum()) / 6.0
-        assert 0.015 < volume < 0.15  # litres of a person and not minus that; open hems leave a little out
+        assert 0.015 < volume < 0.15  # liters of a person and not minus that; open hems leave a little out
         assert np.abs((placed.normals.astype(float) ** 2).sum(axis=1) - 1.0).max() < 1e-4
         across = np.cross(b - a, c - a)
         outward = (placed.normals[placed.mesh.faces].mean(axis=1) * across).sum(axis=1) > 0.0
@@ -365,10 +365,10 @@ def test_postures_are_distinct_and_where_they_say(walkers):
                 assert abs(poses[grounded][soles(walker, side), 2].min()) < 0.005, grounded
 
 
-def test_outfits_colour_the_materials():
+def test_outfits_color_the_materials():
     plain, checked = load_body("man", "blue"), load_body("man", "checks")
     assert (plain.mesh.pattern == 0).all()
-    shirt = (checked.mesh.colours == np.float32(OUTFITS["checks"].shirt)).all(axis=1)
+    shirt = (checked.mesh.colors == np.float32(OUTFITS["checks"].shirt)).all(axis=1)
     assert shirt.any()
     assert np.array_equal(checked.mesh.pattern == 2, shirt)
     assert np.array_equal(plain.mesh.faces, checked.mesh.faces)

@@ -12,29 +12,29 @@ from follow_env.config import CameraConfig
 from follow_env.world.scene import Box, Capsule, Cylinder, Light, Sphere
 from follow_env.world.scenes import make_scene
 
-from .drawing import GREY, RED, SMALL, blob, flat, reference, scene
+from .drawing import GRAY, RED, SMALL, blob, flat, reference, scene
 
 CLUTTER = scene(
     Box((3.0, 0.6, 0.5), (0.8, 0.3, 1.0), RED, 0.7),
-    Box((4.0, -1.0, 0.9), (0.05, 1.5, 1.8), GREY, -0.4),
+    Box((4.0, -1.0, 0.9), (0.05, 1.5, 1.8), GRAY, -0.4),
     Box((5.0, 0.0, 1.2), (10.0, 6.0, 0.02), RED, 0.1),
-    Box((8.0, 0.0, 1.0), (0.1, 30.0, 4.0), GREY),
+    Box((8.0, 0.0, 1.0), (0.1, 30.0, 4.0), GRAY),
     Cylinder((2.0, -0.6, 0.4), 0.25, 0.8, RED),
     Cylinder((3.5, 0.2, 1.4), 0.4, 0.3, RED),
-    Cylinder((6.0, 1.5, 1.5), 0.2, 3.0, GREY),
+    Cylinder((6.0, 1.5, 1.5), 0.2, 3.0, GRAY),
     Sphere((3.2, -0.5, 1.0), 0.3, RED),
-    Sphere((1.6, 0.7, 1.6), 0.2, GREY),
+    Sphere((1.6, 0.7, 1.6), 0.2, GRAY),
     Capsule((2.4, 0.2, 0.7), 0.15, 1.2, RED),
-    Capsule((4.5, 0.9, 1.3), 0.5, 1.4, GREY),
+    Capsule((4.5, 0.9, 1.3), 0.5, 1.4, GRAY),
 )
 
 
 @pytest.mark.parametrize("view", range(12))
 def test_agrees_with_a_ray_caster(view):
-    """Depth, ids and colours at every pixel centre against the reference: off depth edges all, everywhere 99.7 %.
+    """Depth, ids and colors at every pixel center against the reference: off depth edges all, everywhere 99.7 %.
 
-    Depth to 0.1 mm + 1e-5 of it, colours to one level of 255 by the stated law of light (flat-shaded people are not
-    compared in colour: their light is interpolated between vertices).
+    Depth to 0.1 mm + 1e-5 of it, colors to one level of 255 by the stated law of light (flat-shaded people are not
+    compared in color: their light is interpolated between vertices).
     """
     rng = np.random.default_rng(view)
     pose = CameraPose(*rng.uniform((-0.5, -0.8, 0.3, -0.6), (2.8, 0.8, 1.9, 0.6)).tolist())
@@ -53,15 +53,15 @@ def test_agrees_with_a_ray_caster(view):
         q = 1.0 / ((offset**2).sum(axis=-1) + 1.0)
         facing = np.maximum((normals * offset).sum(axis=-1) * np.sqrt(q), 0.0)
         light += lamp.intensity * ((lamp.position[2] - 1.0) ** 2 + 1.0) * q * (0.25 + 0.75 * facing)
-    colours = np.minimum(255.0 * albedo * light[..., None], 255.0)
-    same = (np.abs(frame.rgb - colours) <= 1.01).all(axis=-1)
+    colors = np.minimum(255.0 * albedo * light[..., None], 255.0)
+    same = (np.abs(frame.rgb - colors) <= 1.01).all(axis=-1)
     seen = good & (ids == 0) & (depth < camera.config.far)
     assert seen.sum() > 1000
     assert same[seen].mean() > 0.999
 
 
-def test_pixels_are_taken_at_their_centres():
-    """A plate that faces the camera covers just the pixels whose centres lie within the projection of its corners."""
+def test_pixels_are_taken_at_their_centers():
+    """A plate that faces the camera covers just the pixels whose centers lie within the projection of its corners."""
     rng, camera = np.random.default_rng(3), PinholeCamera(CameraConfig(width=320, height=240))
     v, u = np.mgrid[:240, :320] + 0.5
     for _ in range(20):
@@ -80,7 +80,7 @@ def test_pixels_are_taken_at_their_centres():
 
 
 def test_the_picture_moves_with_the_camera():
-    """Towards a wall the depth falls by what the camera moves; a millimetre's step changes the picture little."""
+    """Toward a wall the depth falls by what the camera moves; a millimeter's step changes the picture little."""
     place = make_scene("indoor")
     renderer, person = RasterRenderer(place, SMALL), blob(2.5, 0.2, 0.8)
     before = None
@@ -98,7 +98,7 @@ def test_the_picture_moves_with_the_camera():
         assert frame.depth[:60] == pytest.approx(4.95 - 0.09 * step, abs=1e-5)
 
 
-def test_neighbouring_triangles_leave_no_cracks():
+def test_neighboring_triangles_leave_no_cracks():
     """Before a blob that fills the picture, no pixel sees the wall behind, from 300 places."""
     renderer = RasterRenderer(scene(Box((9.0, 0.0, 10.0), (0.1, 30.0, 30.0), RED)), SMALL)
     rng = np.random.default_rng(5)
@@ -123,7 +123,7 @@ def test_people_have_their_own_ids_and_patterns():
     assert np.count_nonzero(np.diff(stripes)) > 10
 
 
-def test_supersampling_smooths_colours_and_nothing_else():
+def test_supersampling_smooths_colors_and_nothing_else():
     pose, people = CameraPose(0.0, 0.0, 1.0, 0.0), [blob(2.0, 0.1, 0.8, pattern=2)]
     plain = RasterRenderer(make_scene("indoor"), SMALL).render(pose, people)
     doubled = PinholeCamera(CameraConfig(width=160, height=120, supersample=2))

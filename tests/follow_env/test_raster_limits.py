@@ -87,7 +87,7 @@ def test_the_largest_picture():
     camera, corridor = PinholeCamera(CameraConfig(width=4096, height=4096)), make_scene("corridor")
     place = dataclasses.replace(corridor, primitives=(*corridor.primitives, Sphere((3.0, 1.0, 1.0), 0.2, RED)))
     frame = RasterRenderer(place, camera).render(CameraPose(0.0, 0.0, 1.0, 0.0))
-    middle = frame.depth[2048, round(2048 - camera.focal / 3.0)]  # the ray to the centre, sqrt(10) m away
+    middle = frame.depth[2048, round(2048 - camera.focal / 3.0)]  # the ray to the center, sqrt(10) m away
     assert middle == pytest.approx(3.0 * (1.0 - 0.2 / math.sqrt(10.0)), abs=1e-3)
     assert frame.depth[2048, 2048] == pytest.approx(19.96, abs=1e-4)
     rows = np.arange(2400, 4096)
@@ -121,7 +121,7 @@ def test_bad_settings_and_meshes_are_clear_errors():
     with pytest.raises(ValueError, match="id of a placed mesh is 0"):
         Placed(good.mesh, good.vertices, good.normals, 0)
     with pytest.raises(ValueError, match="mesh faces name the vertices"):
-        Mesh(good.mesh.faces + np.int32(5), good.mesh.colours, good.mesh.pattern, good.mesh.anchors)
+        Mesh(good.mesh.faces + np.int32(5), good.mesh.colors, good.mesh.pattern, good.mesh.anchors)
 
 
 def test_memory_stays_constant_over_10000_frames():

@@ -86,13 +86,13 @@ def test_the_masks_of_primitives_agree_with_tiny_renderer(kind):
     for _ in range(10):
         x, y, yaw = rng.uniform((1.5, -1.0, -3.0), (5.0, 1.0, 3.0)).tolist()
         size, radius = rng.uniform(0.2, 1.2, 3).tolist(), float(rng.uniform(0.15, 0.4))
-        centre = (x, y, 0.6)
+        center = (x, y, 0.6)
         if kind is Box:
-            solid = Box(centre, size, RED, yaw)
+            solid = Box(center, size, RED, yaw)
         elif kind is Sphere:
-            solid = Sphere(centre, radius, RED)
+            solid = Sphere(center, radius, RED)
         else:
-            solid = kind(centre, radius, 2.0 * radius + size[2], RED)
+            solid = kind(center, radius, 2.0 * radius + size[2], RED)
         pose, masks = CameraPose(0.0, 0.0, 1.0, 0.0), []
         for make in (RasterRenderer, TinyRenderer):
             depths = []

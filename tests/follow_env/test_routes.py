@@ -41,9 +41,9 @@ def distance_to_obstacles(scene, points):
     least = np.full(len(points), np.inf)
     for part in scene.primitives:
         height = part.size[2] if isinstance(part, Box) else part.height
-        if not part.solid or part.centre[2] - height / 2 >= 2.0:
+        if not part.solid or part.center[2] - height / 2 >= 2.0:
             continue
-        offset = points - np.array(part.centre[:2])
+        offset = points - np.array(part.center[:2])
         if isinstance(part, Box):
             turned = np.array([[math.cos(part.yaw), -math.sin(part.yaw)], [math.sin(part.yaw), math.cos(part.yaw)]])
             beyond = np.maximum(np.abs(offset @ turned) - np.array(part.size[:2]) / 2, 0.0)
@@ -78,7 +78,7 @@ def test_the_heading_stays_within_50_degrees_of_the_start(scene):
 
 @pytest.mark.parametrize("scene", ["corridor", "indoor"])
 def test_routes_keep_their_distance_from_everything_solid(scene):
-    """Sampled every centimetre of the way; the stated clearance may be missed by a centimetre between the samples."""
+    """Sampled every centimeter of the way; the stated clearance may be missed by a centimeter between the samples."""
     place = make_scene(scene)
     for seed, route in enumerate(paper_routes(scene)):
         points = np.array([route.pose(float(t))[:2] for t in np.linspace(0.0, 14.0, 1401)])

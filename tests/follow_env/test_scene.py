@@ -26,16 +26,16 @@ ROUND = (
 
 
 def to_axis(point, solid):
-    """Distance from a point to a sphere's centre or to the straight axis of a capsule, m."""
+    """Distance from a point to a sphere's center or to the straight axis of a capsule, m."""
     half = 0.5 * solid.straight if isinstance(solid, Capsule) else 0.0
-    x, y, z = np.subtract(point, solid.centre)
+    x, y, z = np.subtract(point, solid.center)
     return math.hypot(x, y, z - min(max(z, -half), half))
 
 
 def test_clearance_is_the_distance_to_the_nearest_round_solid():
     rng, place = np.random.default_rng(0), scene(*ROUND)
     for point in rng.uniform((1.0, -2.0), (7.0, 2.0), (50, 2)):
-        gaps = [math.hypot(point[0] - p.centre[0], point[1] - p.centre[1]) - p.radius for p in ROUND]
+        gaps = [math.hypot(point[0] - p.center[0], point[1] - p.center[1]) - p.radius for p in ROUND]
         assert place.clearance(point[None]) == pytest.approx(max(min(gaps), 0.0), abs=1e-12)
 
 
@@ -51,7 +51,7 @@ def test_what_is_high_up_or_not_solid_is_no_obstacle():
     ("make", "message"),
     [
         (lambda: Sphere((0.0, 0.0, 0.0), 0.0, RED), r"Sphere\(.*radius=0.0.* cannot be; expected finite .* sizes > 0"),
-        (lambda: Sphere((math.nan, 0.0, 0.0), 0.1, RED), "nan.* cannot be; expected finite metres"),
+        (lambda: Sphere((math.nan, 0.0, 0.0), 0.1, RED), "nan.* cannot be; expected finite meters"),
         (lambda: Box((0.0, 0.0, 0.0), (1.0, -1.0, 1.0), RED), r"size=\(1.0, -1.0, 1.0\).* cannot be"),
         (lambda: Cylinder((0.0, 0.0, 0.0), 0.1, math.inf, RED), "height=inf.* cannot be"),
         (lambda: Capsule((0.0, 0.0, 0.0), 0.3, 0.6, RED), "radius 0.3 m has the height 0.6 m; expected more than the"),
@@ -97,7 +97,7 @@ def test_the_robot_runs_into_round_solids(solid):
 
 @pytest.mark.parametrize("solid", ROUND[:2], ids=["sphere", "capsule"])
 def test_the_plan_shows_round_solids_in_place(solid):
-    """What a solid adds to the plan is a disc of its radius at its centre, each edge to 2 px."""
+    """What a solid adds to the plan is a disc of its radius at its center, each edge to 2 px."""
     place = dataclasses.replace(scene(), bounds=(0.0, 6.0, -1.5, 1.5))
     pictures = []
     for primitives in ((), (solid,)):
@@ -110,9 +110,9 @@ def test_the_plan_shows_round_solids_in_place(solid):
     rows, columns = np.nonzero(np.abs(pictures[0] - pictures[1]).max(axis=2))
     scale = (480 - 24) / 6.0
     assert (np.ptp(rows) + 1, np.ptp(columns) + 1) == pytest.approx([2.0 * scale * solid.radius] * 2, abs=4.0)
-    assert columns.mean() == pytest.approx(12.0 + scale * solid.centre[0], abs=1.0)
+    assert columns.mean() == pytest.approx(12.0 + scale * solid.center[0], abs=1.0)
     middle = 30 + 0.5 * (360 - 60)
-    assert rows.mean() == pytest.approx(middle - scale * solid.centre[1], abs=1.0)
+    assert rows.mean() == pytest.approx(middle - scale * solid.center[1], abs=1.0)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -149,7 +149,7 @@ def test_the_environment_passes_the_light_on():
 
 
 def test_materials_of_the_primitives_reach_the_picture():
-    """Side by side a sphere, a capsule and a box of one material have about one colour where they face the camera."""
+    """Side by side a sphere, a capsule and a box of one material have about one color where they face the camera."""
     blue = Material((0.1, 0.2, 0.8))
     place = scene(
         Sphere((2.2, 0.5, 1.0), 0.2, blue),
@@ -158,6 +158,6 @@ def test_materials_of_the_primitives_reach_the_picture():
     )
     frame = make_renderer("raster", place, SMALL).render(CameraPose(0.0, 0.0, 1.0, 0.0))
     columns = [round(SMALL.cx - SMALL.focal * y / 2.0) for y in (0.5, 0.0, -0.5)]
-    colours = frame.rgb[60, columns].astype(int)
-    assert (colours.argmax(axis=1) == 2).all()
-    assert np.ptp(colours, axis=0).max() < 25
+    colors = frame.rgb[60, columns].astype(int)
+    assert (colors.argmax(axis=1) == 2).all()
+    assert np.ptp(colors, axis=0).max() < 25

@@ -14,10 +14,10 @@ import pytest
 
 from follow_env.camera import PinholeCamera, RGBDFrame
 from follow_env.camera.sensor.errors import RGBDSensor
-from follow_env.config import HARSH_SENSOR, IDEAL_SENSOR, CameraConfig, ColourConfig, DepthConfig, SensorConfig
+from follow_env.config import HARSH_SENSOR, IDEAL_SENSOR, CameraConfig, ColorConfig, DepthConfig, SensorConfig
 
 WIDTH, HEIGHT = 250, 200
-GREY = np.full((HEIGHT, WIDTH, 3), 128, np.uint8)
+GRAY = np.full((HEIGHT, WIDTH, 3), 128, np.uint8)
 NORMAL = NormalDist()
 
 
@@ -30,16 +30,16 @@ def read(depth, rgb=None, seed=1, **dials):
     depth = np.asarray(depth, np.float32)
     rgb = np.full((*depth.shape, 3), 128, np.uint8) if rgb is None else rgb
     sensor = RGBDSensor(
-        dataclasses.replace(IDEAL_SENSOR.depth, **dials), IDEAL_SENSOR.colour, camera(*depth.shape[::-1])
+        dataclasses.replace(IDEAL_SENSOR.depth, **dials), IDEAL_SENSOR.color, camera(*depth.shape[::-1])
     )
     return sensor.corrupt(RGBDFrame(rgb, depth, np.zeros(depth.shape, np.uint8)), seed).depth
 
 
 def look(rgb, seed=1, **dials):
-    """The colours that a sensor with only these errors of the colour reports."""
+    """The colors that a sensor with only these errors of the color reports."""
     shape = rgb.shape[:2]
     sensor = RGBDSensor(
-        IDEAL_SENSOR.depth, dataclasses.replace(IDEAL_SENSOR.colour, **dials), camera(shape[1], shape[0])
+        IDEAL_SENSOR.depth, dataclasses.replace(IDEAL_SENSOR.color, **dials), camera(shape[1], shape[0])
     )
     return sensor.corrupt(RGBDFrame(rgb, np.ones(shape, np.float32), np.zeros(shape, np.uint8)), seed).rgb
 
@@ -63,7 +63,7 @@ def frame_hash(width=90, height=70):
     rgb = np.stack([(v * 3) % 256, (u * 5) % 256, (u + v) % 256], axis=-1).astype(np.uint8)
     digest = hashlib.sha256()
     for config in (SensorConfig(), HARSH_SENSOR):
-        sensor = RGBDSensor(config.depth, config.colour, camera(width, height))
+        sensor = RGBDSensor(config.depth, config.color, camera(width, height))
         for seed in (0, 1, 2**64 - 1):
             frame = sensor.corrupt(RGBDFrame(rgb, depth, np.zeros(depth.shape, np.uint8)), seed)
             digest.update(frame.depth.tobytes() + frame.rgb.tobytes())
@@ -72,7 +72,7 @@ def frame_hash(width=90, height=70):
 
 @pytest.mark.parametrize("z", [0.6, 1.0, 2.0, 4.0, 7.0])
 def test_axial_noise_grows_as_stated(z):
-    """sigma(z) = 0.0012 + 0.0019 (z - 0.4)^2 m, without bias, normal, independent of the neighbours."""
+    """sigma(z) = 0.0012 + 0.0019 (z - 0.4)^2 m, without bias, normal, independent of the neighbors."""
     noisy = read(wall(z), axial_noise=1.0).astype(float)
     sigma = 0.0012 + 0.0019 * (z - 0.4) ** 2
     assert noisy.std() == pytest.approx(sigma, rel=0.02)
@@ -117,9 +117,9 @@ def test_depth_out_of_range_is_no_reading():
 def test_what_lies_beyond_the_renderers_far_is_nothing_seen():
     """Also when the sensor reaches farther; noise never lifts a reading above the observation's bound."""
     near_sighted = PinholeCamera(CameraConfig(width=40, height=30, far=5.0))
-    sensor = RGBDSensor(DepthConfig(axial_noise=9.0), IDEAL_SENSOR.colour, near_sighted)
+    sensor = RGBDSensor(DepthConfig(axial_noise=9.0), IDEAL_SENSOR.color, near_sighted)
     for z, wanted in ((5.0, 0.0), (4.99, 5.0)):
-        frame = RGBDFrame(GREY[:30, :40], np.full((30, 40), z, np.float32), np.zeros((30, 40), np.uint8))
+        frame = RGBDFrame(GRAY[:30, :40], np.full((30, 40), z, np.float32), np.zeros((30, 40), np.uint8))
         assert sensor.corrupt(frame, 1).depth.max() == wanted
 
 
@@ -183,12 +183,12 @@ def test_the_projectors_shadow_lies_left_and_is_as_wide_as_the_disparities_diffe
     assert (read(wall(2.0), shadow=1.0) > 0.0).all()
 
 
-@pytest.mark.parametrize("colour", [(0, 0, 0), (10, 20, 30), (60, 10, 200), (0, 100, 0), (255, 255, 255)])
-def test_dark_surfaces_are_lost_as_stated(colour):
+@pytest.mark.parametrize("color", [(0, 0, 0), (10, 20, 30), (60, 10, 200), (0, 100, 0), (255, 255, 255)])
+def test_dark_surfaces_are_lost_as_stated(color):
     """dark_dropout max(0, 1 - L / dark_level), L the luminance of Rec. 601."""
-    rgb = np.full_like(GREY, colour)
+    rgb = np.full_like(GRAY, color)
     p, error = share(read(wall(2.0), rgb, dark_level=70.0, dark_dropout=0.8) == 0.0)
-    luminance = 0.299 * colour[0] + 0.587 * colour[1] + 0.114 * colour[2]
+    luminance = 0.299 * color[0] + 0.587 * color[1] + 0.114 * color[2]
     assert p == pytest.approx(0.8 * max(1.0 - luminance / 70.0, 0.0), abs=4.0 * error)
 
 
@@ -220,14 +220,14 @@ def test_a_depth_edge_is_not_a_grazing_surface():
     assert (read(depth, grazing_deg=45.0, grazing_dropout=1.0) > 0.0).all()
 
 
-def test_what_is_no_depth_is_no_reading_and_spoils_no_neighbour():
+def test_what_is_no_depth_is_no_reading_and_spoils_no_neighbor():
     depth = wall(2.0)
     holes = ((10, 10, np.nan), (20, 30, np.inf), (30, 50, 0.0), (40, 70, -1.0), (0, 0, np.nan), (199, 249, np.inf))
     for i, j, value in holes:
         depth[i, j] = value
     for config in (IDEAL_SENSOR.depth, DepthConfig(lateral_noise=0.0, edge_band=0), HARSH_SENSOR.depth):
-        sensor = RGBDSensor(config, ColourConfig(), camera())
-        seen = sensor.corrupt(RGBDFrame(GREY, depth, np.zeros(depth.shape, np.uint8)), 1).depth
+        sensor = RGBDSensor(config, ColorConfig(), camera())
+        seen = sensor.corrupt(RGBDFrame(GRAY, depth, np.zeros(depth.shape, np.uint8)), 1).depth
         assert np.isfinite(seen).all()
         assert (seen >= 0.0).all()
         if config.edge_band == 0:
@@ -236,9 +236,9 @@ def test_what_is_no_depth_is_no_reading_and_spoils_no_neighbour():
 
 
 @pytest.mark.parametrize(("level", "shot", "gain"), [(128, 0.0, 1.0), (128, 0.3, 1.0), (60, 0.3, 1.5), (200, 0.5, 0.5)])
-def test_colour_noise_is_as_stated(level, shot, gain):
+def test_color_noise_is_as_stated(level, shot, gain):
     """sigma^2 = read^2 + shot^2 I at the exposed level I, and 1/12 of the rounding; channels independent."""
-    seen = look(np.full_like(GREY, level), read_noise=2.0, shot_noise=shot, gain=gain).astype(float)
+    seen = look(np.full_like(GRAY, level), read_noise=2.0, shot_noise=shot, gain=gain).astype(float)
     assert seen.mean() == pytest.approx(level * gain, abs=0.1)
     assert seen.var() == pytest.approx(4.0 + shot * shot * level * gain + 1.0 / 12.0, rel=0.03)
     pixels = seen.reshape(-1, 3)
@@ -250,7 +250,7 @@ def test_colour_noise_is_as_stated(level, shot, gain):
 @pytest.mark.parametrize("sigma", [0.4, 0.8, 2.0, 3.0])
 @pytest.mark.parametrize("upright", [False, True])
 def test_blur_has_the_stated_width(sigma, upright):
-    """A step's slope is the blur's kernel: its variance is sigma^2. A grey picture stays, up to its borders."""
+    """A step's slope is the blur's kernel: its variance is sigma^2. A gray picture stays, up to its borders."""
     step = np.zeros((90, 640, 3), np.uint8)
     along = 640 if not upright else 90
     step[(slice(None), slice(320, None)) if not upright else slice(45, None)] = 240
@@ -273,7 +273,7 @@ def test_an_ideal_sensor_changes_nothing():
     depth = rng.uniform(0.05, 30.0, (HEIGHT, WIDTH)).astype(np.float32)
     depth[:10] = 30.0
     rgb = rng.integers(0, 256, (HEIGHT, WIDTH, 3), np.uint8)
-    sensor = RGBDSensor(IDEAL_SENSOR.depth, IDEAL_SENSOR.colour, camera())
+    sensor = RGBDSensor(IDEAL_SENSOR.depth, IDEAL_SENSOR.color, camera())
     seen = sensor.corrupt(RGBDFrame(rgb, depth, np.ones(depth.shape, np.uint8)), 5)
     assert (seen.depth == depth).all()
     assert (seen.rgb == rgb).all()
@@ -283,18 +283,18 @@ def test_an_ideal_sensor_changes_nothing():
 @pytest.mark.parametrize(("width", "height"), [(1, 1), (1, 9), (9, 1), (2, 2), (3, 5)])
 def test_small_pictures_are_read_too(width, height):
     frame = RGBDFrame(
-        GREY[:height, :width].copy(), wall(2.0)[:height, :width].copy(), np.zeros((height, width), np.uint8)
+        GRAY[:height, :width].copy(), wall(2.0)[:height, :width].copy(), np.zeros((height, width), np.uint8)
     )
     for config in (SensorConfig(), HARSH_SENSOR):
-        seen = RGBDSensor(config.depth, config.colour, camera(width, height)).corrupt(frame, 3)
+        seen = RGBDSensor(config.depth, config.color, camera(width, height)).corrupt(frame, 3)
         assert seen.depth.shape == (height, width)
         assert ((seen.depth == 0.0) | (np.abs(seen.depth - 2.0) < 0.2)).all()
 
 
 def test_one_seed_gives_one_frame_whatever_came_before():
     config = SensorConfig()
-    frame = RGBDFrame(GREY, wall(2.0), np.zeros((HEIGHT, WIDTH), np.uint8))
-    sensor = RGBDSensor(config.depth, config.colour, camera())
+    frame = RGBDFrame(GRAY, wall(2.0), np.zeros((HEIGHT, WIDTH), np.uint8))
+    sensor = RGBDSensor(config.depth, config.color, camera())
     first, other, again = (sensor.corrupt(frame, seed) for seed in (7, 8, 7))
     assert (first.depth == again.depth).all()
     assert (first.rgb == again.rgb).all()

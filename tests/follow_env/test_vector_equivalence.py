@@ -44,7 +44,7 @@ def chase_by_wheels(info):
     ],
 )
 def test_the_same_episodes_come_out_step_by_step(scene, settings, policy):
-    """Routes, errors, delays, rewards, endings and every entry of info; the robot within centimetres."""
+    """Routes, errors, delays, rewards, endings and every entry of info; the robot within centimeters."""
     settings = {"scene": scene, "sensor": BAD_SENSOR, **settings}
     seeds = [0, 7]
     batch = FollowVectorEnv(len(seeds), **settings)
@@ -101,7 +101,7 @@ def test_half_the_walking_speed_takes_twice_the_time(scene):
 
 @SCENE
 def test_touch_and_sight_are_those_of_pybullet(scene):
-    """At random poses beside obstacles; Bullet's own rounding decides differently within half a millimetre."""
+    """At random poses beside obstacles; Bullet's own rounding decides differently within half a millimeter."""
     place, rng, robot = pack_place(make_scene(scene), 1.0, 1.2), np.random.default_rng(0), RobotConfig()
     world = World(make_scene(scene), robot)
     wheel, half_track = robot.wheel_radius, 0.5 * robot.track_width

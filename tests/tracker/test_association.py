@@ -134,10 +134,10 @@ def test_a_box_between_two_others_is_the_one_that_both_cover():
     assert not between(bridge, [left])
     assert not between(bridge, [left, (200.0, 40.0, 260.0, 200.0)])
     assert not between(bridge, [])
-    assert not between(bridge, [left, (100.0, 60.0, 125.0, 180.0)])  # but a fifth in it: an arm, not a neighbour
+    assert not between(bridge, [left, (100.0, 60.0, 125.0, 180.0)])  # but a fifth in it: an arm, not a neighbor
 
 
-def test_a_box_is_alone_between_its_neighbours():
+def test_a_box_is_alone_between_its_neighbors():
     box, left, right = (50.0, 40.0, 110.0, 200.0), (0.0, 30.0, 62.0, 210.0), (100.0, 45.0, 160.0, 205.0)
 
     assert alone(box, []) == box

@@ -12,7 +12,7 @@ from filterpy.common import Q_continuous_white_noise
 from scipy import stats
 from scipy.linalg import block_diag
 
-from tracker.estimators.filters import AdaptiveKalmanFilter, AugmentedKalmanFilter, KalmanFilter
+from tracker.estimators import AdaptiveKalmanFilter, AugmentedKalmanFilter, KalmanFilter
 
 Q = (2.0e-4, 8.0e-4)
 R = (3.0e-4, 2.0e-2)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tracker.estimators.filters import (
+from tracker.estimators import (
     AdaptiveKalmanFilter,
     AugmentedKalmanFilter,
     KalmanFilter,
@@ -295,7 +295,7 @@ def test_too_small_process_noise_locks_the_filter_out_and_is_reported_once():
     run = noisy_walk(np.random.default_rng(2), 420)
     warned, estimates = lock_out_warnings(estimator, run, (SPEED, 0.0))
     assert sum(e.action[1] == "inflate" for e in estimates) > 0.8 * len(run)
-    assert abs(estimates[-1].distance - 1.5) > 1.0  # metres wrong, as the warning is about
+    assert abs(estimates[-1].distance - 1.5) > 1.0  # meters wrong, as the warning is about
     assert len(warned) == 1
     assert "distance" in str(warned[0].message)
     assert warned[0].filename == __file__

@@ -251,7 +251,7 @@ def test_a_third_box_between_two_people_is_nobody(seed):
 
 
 def test_in_company_a_place_that_is_not_plausible_is_not_taken_though_inside_the_gate():
-    """A quarter of a metre to the other's side in one frame; alone, and as printed, it is taken."""
+    """A quarter of a meter to the other's side in one frame; alone, and as printed, it is taken."""
     taken = {}
     for company, others in (("apart", [(2.4, 0.9)]), ("printed", [(2.4, 0.9)]), ("apart", [])):
         show = Show(dataclasses.replace(TEN_HZ, company=company))
@@ -262,7 +262,7 @@ def test_in_company_a_place_that_is_not_plausible_is_not_taken_though_inside_the
     assert taken == {("apart", 1): False, ("printed", 1): True, ("apart", 0): True}
 
 
-def test_a_neighbours_arm_before_the_person_does_not_move_it():
+def test_a_neighbors_arm_before_the_person_does_not_move_it():
     """Both are detected; the arm is 0.2 m nearer and lies under a column of the samples."""
     moved_by = {}
     for company in ("apart", "printed"):
@@ -475,11 +475,11 @@ def test_the_same_stream_gives_the_same_tracks_and_trackers_share_nothing():
 def test_bad_input_is_one_sentence():
     show = Show()
     rgb, depth, _ = picture((2.0, 0.0))
-    with pytest.raises(ValueError, match=r"colour has shape \(120, 150, 3\) and depth \(120, 160\)"):
+    with pytest.raises(ValueError, match=r"color has shape \(120, 150, 3\) and depth \(120, 160\)"):
         show.tracker.update(rgb[:, :150], depth)
     with pytest.raises(ValueError, match=r"intrinsics are of 160x120; use intrinsics.scaled\(80, 60\)"):
         show.tracker.update(rgb[::2, ::2], depth[::2, ::2])
-    with pytest.raises(TypeError, match="uint16; expected floating point metres"):
+    with pytest.raises(TypeError, match="uint16; expected floating point meters"):
         show.tracker.update(rgb, (1000 * depth).astype(np.uint16))
     with pytest.raises(ValueError, match="twist"):
         show.tracker.update(rgb, depth, (math.nan, 0.0))

@@ -1,4 +1,4 @@
-"""Reading a folder of colour and depth pictures: what comes back is what was written, and what is wrong is said."""
+"""Reading a folder of color and depth pictures: what comes back is what was written, and what is wrong is said."""
 
 import json
 
@@ -12,15 +12,15 @@ from tracker.recording import Recording, UnreadableFrame
 CAMERA = {"width": 32, "height": 24, "fx": 30.0, "fy": 31.0, "cx": 16.0, "cy": 12.0, "fps": 30}
 
 
-def write(folder, colour_names, depth_names, camera=CAMERA, colour="color"):
+def write(folder, color_names, depth_names, camera=CAMERA, color="color"):
     """Write noise; return the pictures as (rgb, depth in units) by index."""
     rng = np.random.default_rng(0)
-    (folder / colour).mkdir(parents=True)
+    (folder / color).mkdir(parents=True)
     (folder / "depth").mkdir()
-    rgb = [rng.integers(0, 256, (24, 32, 3), np.uint8) for _ in colour_names]
+    rgb = [rng.integers(0, 256, (24, 32, 3), np.uint8) for _ in color_names]
     depth = [rng.integers(0, 60000, (24, 32), np.uint16) for _ in depth_names]
-    for name, picture in zip(colour_names, rgb, strict=True):
-        assert cv2.imwrite(str(folder / colour / name), picture[:, :, ::-1])
+    for name, picture in zip(color_names, rgb, strict=True):
+        assert cv2.imwrite(str(folder / color / name), picture[:, :, ::-1])
     for name, picture in zip(depth_names, depth, strict=True):
         assert cv2.imwrite(str(folder / "depth" / name), picture)
     (folder / "camera.json").write_text(json.dumps(camera), encoding="utf-8")
@@ -30,7 +30,7 @@ def write(folder, colour_names, depth_names, camera=CAMERA, colour="color"):
 def test_what_is_read_is_what_was_written(tmp_path):
     names = ["0000.png", "0001.png", "0002.png"]
     camera = {**CAMERA, "depth_scale": 0.0002, "mounting": {"forward": 0.1, "height": 1.0}}
-    rgb, depth = write(tmp_path, names, names, camera, colour="rgb")
+    rgb, depth = write(tmp_path, names, names, camera, color="rgb")
 
     recording = Recording.open(tmp_path)
 
@@ -38,13 +38,13 @@ def test_what_is_read_is_what_was_written(tmp_path):
     assert (recording.intrinsics.fy, recording.intrinsics.width) == (31.0, 32)
     assert len(recording.frames) == 3
     for index in range(3):
-        colour, metres = recording.read(index)
-        assert np.array_equal(colour, rgb[index])
-        assert metres.dtype == np.float32
-        assert metres == pytest.approx(depth[index] * 0.0002, rel=1e-6)
+        color, meters = recording.read(index)
+        assert np.array_equal(color, rgb[index])
+        assert meters.dtype == np.float32
+        assert meters == pytest.approx(depth[index] * 0.0002, rel=1e-6)
 
 
-def test_millimetres_and_the_origin_are_the_defaults(tmp_path):
+def test_millimeters_and_the_origin_are_the_defaults(tmp_path):
     _, depth = write(tmp_path, ["a.jpg"], ["a.png"])
 
     recording = Recording.open(tmp_path)
@@ -54,7 +54,7 @@ def test_millimetres_and_the_origin_are_the_defaults(tmp_path):
 
 
 def stems(recording):
-    return [(colour.stem, depth.stem) for colour, depth in recording.frames]
+    return [(color.stem, depth.stem) for color, depth in recording.frames]
 
 
 def test_pairs_by_name_keep_a_frame_whose_depth_is_missing(tmp_path):
@@ -86,7 +86,7 @@ def test_pairs_by_order(tmp_path):
 
 def test_pictures_that_make_no_pairs(tmp_path):
     write(tmp_path, ["c1.png", "c2.png"], ["d1.png"])
-    with pytest.raises(ValueError, match="2 colour and 1 depth pictures make no pairs"):
+    with pytest.raises(ValueError, match="2 color and 1 depth pictures make no pairs"):
         Recording.open(tmp_path)
 
 
@@ -114,7 +114,7 @@ def rewrite(folder, name, shape, dtype=np.uint16):
     ("spoil", "sentence"),
     [
         (lambda f: rewrite(f, "depth/0.png", (12, 16)), r"0\.png is 32x24 but .*0\.png is 16x12; expected depth regis"),
-        (lambda f: rewrite(f, "depth/0.png", (24, 32), np.uint8), "is not a 16-bit grey picture"),
+        (lambda f: rewrite(f, "depth/0.png", (24, 32), np.uint8), "is not a 16-bit gray picture"),
         (
             lambda f: (rewrite(f, "depth/0.png", (12, 16)), rewrite(f, "color/0.png", (12, 16, 3), np.uint8)),
             r"is 16x12 but camera\.json is for 32x24",

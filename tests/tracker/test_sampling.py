@@ -218,15 +218,15 @@ def test_a_box_with_a_sliver_of_another_person_is_not_that_person(sliver):
 
 @pytest.mark.parametrize("right", [False, True])
 def test_an_arm_before_the_box_lends_no_depth_where_its_owner_was_detected(right):
-    """The target at 2.2 m; at its edge the neighbour's arm, 0.2 m nearer, under a column of the samples."""
-    target, arm, neighbour = (60, 20, 110, 110), (60, 30, 74, 100), (20.0, 10.0, 74.0, 120.0)
+    """The target at 2.2 m; at its edge the neighbor's arm, 0.2 m nearer, under a column of the samples."""
+    target, arm, neighbor = (60, 20, 110, 110), (60, 30, 74, 100), (20.0, 10.0, 74.0, 120.0)
     if right:
-        target, arm, neighbour = (tuple((160 - b[2], b[1], 160 - b[0], b[3])) for b in (target, arm, neighbour))
+        target, arm, neighbor = (tuple((160 - b[2], b[1], 160 - b[0], b[3])) for b in (target, arm, neighbor))
     depth, _ = show((target, 2.2), (arm, 2.0))
     box = tuple(map(float, target))
 
     _, drawn = seen_at(depth, box, 2.2, 0.3)
-    part, z = seen_at(depth, box, 2.2, 0.3, alone(box, [neighbour]))
+    part, z = seen_at(depth, box, 2.2, 0.3, alone(box, [neighbor]))
 
     assert drawn < 2.1
     assert (part, z) == (box, pytest.approx(2.2))

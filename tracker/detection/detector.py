@@ -76,7 +76,7 @@ def shipped_weights(net: str = "light") -> Path:
 
 
 def network_input(rgb: np.ndarray, depth: np.ndarray | None) -> np.ndarray:
-    """Return the picture (300, 300, 3 or 4) uint8 that a network reads: squashed, the depth as a fourth colour."""
+    """Return the picture (300, 300, 3 or 4) uint8 that a network reads: squashed, the depth as a fourth color."""
     height, width = rgb.shape[:2]
     size = (INPUT_SIZE, INPUT_SIZE)
     if (width, height) != size:

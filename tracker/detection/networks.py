@@ -88,7 +88,7 @@ class MultiBoxNet(nn.Module):
             nn.Conv2d(width, layer.per_cell * (4 + CLASSES), 3, padding=1)
             for width, layer in zip(seen, config.layers, strict=True)
         )
-        self.apply(_initialise)
+        self.apply(_initialize)
         for head in self.heads:
             nn.init.normal_(
                 head.get_parameter("weight"), std=0.01
@@ -187,7 +187,7 @@ def _normed(below: int, width: int, kernel: int, stride: int = 1, padding: int =
     return nn.Sequential(convolution, nn.BatchNorm2d(width), nn.ReLU(inplace=True))
 
 
-def _initialise(module: nn.Module) -> None:
+def _initialize(module: nn.Module) -> None:
     """He et al. (2015): what keeps a deep net with rectifiers trainable from random weights."""
     if isinstance(module, nn.Conv2d):
         nn.init.kaiming_normal_(module.weight, mode="fan_in", nonlinearity="relu")

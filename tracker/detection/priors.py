@@ -1,6 +1,6 @@
 """Prior boxes: where they are, how a box is coded against them, and which of them have to find a person.
 
-Everything is in shares of the picture: u and v from 0 to 1. "Corners" are (u0, v0, u1, v1), "centres" (u, v, w, h).
+Everything is in shares of the picture: u and v from 0 to 1. "Corners" are (u0, v0, u1, v1), "centers" (u, v, w, h).
 """
 
 import math
@@ -14,7 +14,7 @@ from tracker.boxes import iou
 INPUT_SIZE = 300
 """Side of the picture that every network takes, px."""
 VARIANCES = (0.1, 0.2)
-"""Divisors of the coded centre and of the coded size (SSD)."""
+"""Divisors of the coded center and of the coded size (SSD)."""
 MATCH_OVERLAP = 0.5
 """Least overlap at which a prior has to find a person (paper A, figure 8; SSD)."""
 NEAR_OVERLAP, NEAR_SHARE = 0.4, 0.8
@@ -33,7 +33,7 @@ class PriorLayer:
 
     Attributes:
         cells: of the feature map, in both directions.
-        step: between the centres, px.
+        step: between the centers, px.
         smallest: L_min, px.
         largest: L_max, px.
         ratios: width over height, besides the two squares.
@@ -74,7 +74,7 @@ SSD300_LAYERS = (
 
 
 def prior_boxes(layers: tuple[PriorLayer, ...]) -> np.ndarray:
-    """Return the priors (P, 4) as centres, float32, clipped to the picture; order: layer, row, column, shape.
+    """Return the priors (P, 4) as centers, float32, clipped to the picture; order: layer, row, column, shape.
 
     Shapes: w = L_min sqrt(ratio), h = L_min / sqrt(ratio), and the square of side sqrt(L_min L_max) (paper A, 3.1.3).
     """
@@ -88,31 +88,31 @@ def prior_boxes(layers: tuple[PriorLayer, ...]) -> np.ndarray:
         boxes = np.empty((layer.cells, layer.cells, layer.per_cell, 4))
         boxes[..., 0], boxes[..., 1], boxes[..., 2:] = at[None, :, None], at[:, None, None], shapes
         parts.append(boxes.reshape(-1, 4) / INPUT_SIZE)
-    return to_centres(np.clip(to_corners(np.concatenate(parts)), 0.0, 1.0)).astype(np.float32)
+    return to_centers(np.clip(to_corners(np.concatenate(parts)), 0.0, 1.0)).astype(np.float32)
 
 
 def to_corners(boxes: np.ndarray) -> np.ndarray:
-    """Return boxes (..., 4) given as centres as corners."""
+    """Return boxes (..., 4) given as centers as corners."""
     half = 0.5 * boxes[..., 2:]
     return np.concatenate([boxes[..., :2] - half, boxes[..., :2] + half], axis=-1)
 
 
-def to_centres(boxes: np.ndarray) -> np.ndarray:
-    """Return boxes (..., 4) given as corners as centres."""
+def to_centers(boxes: np.ndarray) -> np.ndarray:
+    """Return boxes (..., 4) given as corners as centers."""
     return np.concatenate([0.5 * (boxes[..., :2] + boxes[..., 2:]), boxes[..., 2:] - boxes[..., :2]], axis=-1)
 
 
 def encode(boxes: np.ndarray, priors: np.ndarray) -> np.ndarray:
-    """Return the offsets (P, 4) of boxes (P, 4; corners) from the priors (P, 4; centres), one box for each prior."""
-    centres = to_centres(boxes)
-    shift = (centres[:, :2] - priors[:, :2]) / (VARIANCES[0] * priors[:, 2:])
-    return np.concatenate([shift, np.log(centres[:, 2:] / priors[:, 2:]) / VARIANCES[1]], axis=1)
+    """Return the offsets (P, 4) of boxes (P, 4; corners) from the priors (P, 4; centers), one box for each prior."""
+    centers = to_centers(boxes)
+    shift = (centers[:, :2] - priors[:, :2]) / (VARIANCES[0] * priors[:, 2:])
+    return np.concatenate([shift, np.log(centers[:, 2:] / priors[:, 2:]) / VARIANCES[1]], axis=1)
 
 
 def decode(offsets: np.ndarray, priors: np.ndarray) -> np.ndarray:
-    """Return the boxes (P, 4; corners) at these offsets (P, 4) from the priors (P, 4; centres)."""
-    centres = priors[:, :2] + VARIANCES[0] * offsets[:, :2] * priors[:, 2:]
-    return to_corners(np.concatenate([centres, priors[:, 2:] * np.exp(VARIANCES[1] * offsets[:, 2:])], axis=1))
+    """Return the boxes (P, 4; corners) at these offsets (P, 4) from the priors (P, 4; centers)."""
+    centers = priors[:, :2] + VARIANCES[0] * offsets[:, :2] * priors[:, 2:]
+    return to_corners(np.concatenate([centers, priors[:, 2:] * np.exp(VARIANCES[1] * offsets[:, 2:])], axis=1))
 
 
 class Targets(NamedTuple):
@@ -141,7 +141,7 @@ def match(boxes: np.ndarray, difficult: np.ndarray, priors: np.ndarray) -> Targe
     Args:
         boxes: (N, 4) people, corners.
         difficult: (N,) bool, people that are too hard to see: priors that would take one of them are ignored.
-        priors: (P, 4), centres.
+        priors: (P, 4), centers.
 
     Raises:
         ValueError: if a box is empty, inverted, or not finite, or there are more people than priors.

@@ -17,7 +17,7 @@ def save_weights(network: MultiBoxNet, path: Path) -> None:
     state = {
         name: tensor.detach().cpu().to(torch.float16 if tensor.ndim > 1 else torch.float32).contiguous()
         for name, tensor in network.state_dict().items()
-        if tensor.is_floating_point()  # the counters of batch normalisation are of no use here
+        if tensor.is_floating_point()  # the counters of batch normalization are of no use here
     }
     save_file(state, path, {"made": _made(network.config)})
 

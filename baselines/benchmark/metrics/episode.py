@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from baselines.benchmark.cells import Cell
 from follow_env.envs.task import BAND_BEARING, BAND_DISTANCE, SET_POINT, SUCCESS_BAND_SHARE, SUCCESS_OUT_OF_VIEW
-from tracker.estimators.filters import Estimate
+from tracker.estimators import Estimate
 
 Row = dict[str, "str | int | float | None"]
 """One episode's numbers by column name; None where a column does not apply, never NaN."""

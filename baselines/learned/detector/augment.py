@@ -1,4 +1,4 @@
-"""What a cheap camera and a strange place do to a picture's colours: light, white balance, blur, noise, clutter.
+"""What a cheap camera and a strange place do to a picture's colors: light, white balance, blur, noise, clutter.
 
 Nothing here moves a pixel, so boxes stay true.
 """
@@ -37,15 +37,15 @@ def draw_backdrop(shape: tuple[int, int], rng: np.random.Generator) -> np.ndarra
     picture = cv2.resize(cells, (width, height), interpolation=smooth)
     for _ in range(rng.integers(0, 12)):
         (u0, u1), (v0, v1) = rng.integers(-20, width + 20, 2), rng.integers(-20, height + 20, 2)
-        colour = rng.integers(0, 256, 3).tolist()
+        color = rng.integers(0, 256, 3).tolist()
         kind = rng.integers(3)
         if kind == 0:
-            cv2.rectangle(picture, (int(u0), int(v0)), (int(u1), int(v1)), colour, -1)
+            cv2.rectangle(picture, (int(u0), int(v0)), (int(u1), int(v1)), color, -1)
         elif kind == 1:
-            cv2.line(picture, (int(u0), int(v0)), (int(u1), int(v1)), colour, int(rng.integers(1, 16)))
+            cv2.line(picture, (int(u0), int(v0)), (int(u1), int(v1)), color, int(rng.integers(1, 16)))
         else:
             axes = (int(rng.integers(4, 70)), int(rng.integers(4, 110)))
-            cv2.ellipse(picture, (int(u0), int(v0)), axes, float(rng.uniform(0, 180)), 0, 360, colour, -1)
+            cv2.ellipse(picture, (int(u0), int(v0)), axes, float(rng.uniform(0, 180)), 0, 360, color, -1)
     return picture
 
 
@@ -60,7 +60,7 @@ def _develop(rgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def _hue_turn(rng: np.random.Generator) -> np.ndarray:
-    """Return a matrix (3, 3) that turns the hue and changes the saturation: a turn about the grey axis."""
+    """Return a matrix (3, 3) that turns the hue and changes the saturation: a turn about the gray axis."""
     angle, saturation = rng.uniform(-0.6, 0.6), rng.uniform(0.3, 1.4)
     third = np.full((3, 3), 1.0 / 3.0)
     across = np.array([[0.0, -1.0, 1.0], [1.0, 0.0, -1.0], [-1.0, 1.0, 0.0]]) / np.sqrt(3.0)

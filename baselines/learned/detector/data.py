@@ -115,7 +115,7 @@ class SampleSource:
         self.seed, self.config = seed, config or DataConfig()
         self._camera = PinholeCamera(CAMERA)
         square = PinholeCamera(CameraConfig(width=INPUT_SIZE, height=INPUT_SIZE, hfov_deg=CAMERA.hfov_deg))
-        self._sensor = RGBDSensor(DepthConfig(), IDEAL_SENSOR.colour, square)
+        self._sensor = RGBDSensor(DepthConfig(), IDEAL_SENSOR.color, square)
         self._walkers = {
             (name, detail): Walker(load_body(name, detail=detail)) for name in BODIES for detail in DETAILS
         }
@@ -245,13 +245,13 @@ class SampleSource:
     def _warp(self, picture: np.ndarray, window: np.ndarray, interpolation: int, border: int) -> np.ndarray:
         camera = self._camera
         lens = np.array([[camera.focal, 0.0, camera.cx - 0.5], [0.0, camera.focal, camera.cy - 0.5], [0.0, 0.0, 1.0]])
-        centre = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
+        center = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
         flags = interpolation | cv2.WARP_INVERSE_MAP
         size = (INPUT_SIZE, INPUT_SIZE)
-        return cv2.warpPerspective(picture, lens @ window @ centre, size, flags=flags, borderMode=border)
+        return cv2.warpPerspective(picture, lens @ window @ center, size, flags=flags, borderMode=border)
 
     def _sensed(self, depth: np.ndarray, rgb: np.ndarray, window: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return the reported depth along the inclined camera's axis, for the colours `rgb` of the network's input."""
+        """Return the reported depth along the inclined camera's axis, for the colors `rgb` of the network's input."""
         at = np.arange(INPUT_SIZE, dtype=np.float32) + np.float32(0.5)
         along = window[2, 0] * at[None, :] + window[2, 1] * at[:, None] + window[2, 2]
         turned = self._warp(depth, window, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT) / along.astype(np.float32)

@@ -8,7 +8,7 @@ from baselines.learned.detector.data import Sample, SampleSource
 TILE = (200, 150)
 """Width and height of a picture on the sheet, px: unsquashed."""
 ASKED, UNASKED = (40, 230, 60), (255, 150, 0)
-"""Colours of the boxes of people who have to be found, and of difficult ones."""
+"""Colors of the boxes of people who have to be found, and of difficult ones."""
 
 
 def sheet(source: SampleSource, rows: int = 4, columns: int = 6) -> np.ndarray:

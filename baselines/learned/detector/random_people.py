@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.learned.detector.random_scenes import draw_colour
+from baselines.learned.detector.random_scenes import draw_color
 from follow_env.world.people.bodies import BODIES, OUTFITS, PATTERNS, SUITS, Outfit
 from follow_env.world.people.walker import POSTURES
 
@@ -35,15 +35,15 @@ def draw_posture(rng: np.random.Generator) -> str:
 
 
 def _draw_outfit(rng: np.random.Generator) -> Outfit:
-    """Return clothes of any colours; a fifth are overalls of one colour, as a spacesuit is."""
+    """Return clothes of any colors; a fifth are overalls of one color, as a spacesuit is."""
     dark, light = np.array((0.22, 0.14, 0.10)), np.array((0.92, 0.75, 0.66))
     red, green, blue = (dark + (light - dark) * rng.random()).tolist()
-    shirt = draw_colour(rng)
+    shirt = draw_color(rng)
     return Outfit(
         skin=(red, green, blue),
-        hair=draw_colour(rng, 0.6),
+        hair=draw_color(rng, 0.6),
         shirt=shirt,
-        trousers=shirt if rng.random() < 0.2 else draw_colour(rng, 0.7),
-        shoes=draw_colour(rng, 0.7),
+        trousers=shirt if rng.random() < 0.2 else draw_color(rng, 0.7),
+        shoes=draw_color(rng, 0.7),
         pattern="plain" if rng.random() < 0.6 else PATTERNS[rng.integers(len(PATTERNS))],
     )

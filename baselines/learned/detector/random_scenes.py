@@ -1,6 +1,6 @@
-"""Rooms that nobody designed: size, colours, textures, furniture and lamps by chance, so that a detector learns people.
+"""Rooms that nobody designed: size, colors, textures, furniture and lamps by chance, so that a detector learns people.
 
-The shipped scenes get other light and other colours; a room of chance has everything by chance.
+The shipped scenes get other light and other colors; a room of chance has everything by chance.
 """
 
 import colorsys
@@ -13,14 +13,14 @@ from follow_env.camera.raster.textures import TEXTURES
 from follow_env.world.scene import Box, Cylinder, Light, Material, Scene
 from follow_env.world.scenes import SCENES, make_scene
 
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 
 
 def draw_scene(rng: np.random.Generator) -> Scene:
     """Return one of the shipped scenes (each with probability 0.15) or a room of chance, in a light of chance."""
     names = [*SCENES]
     pick = int(rng.random() / 0.15)
-    scene = _recoloured(make_scene(names[pick]), rng) if pick < len(names) else draw_room(rng)
+    scene = _recolored(make_scene(names[pick]), rng) if pick < len(names) else draw_room(rng)
     strength = rng.uniform(0.4, 1.5)
     lights = tuple(Light(m.position, m.intensity * strength * float(rng.uniform(0.3, 1.5))) for m in scene.lights)
     return dataclasses.replace(scene, lights=lights, ambient=float(rng.uniform(0.15, 0.6)))
@@ -53,13 +53,13 @@ def draw_room(rng: np.random.Generator) -> Scene:
 
 
 def draw_material(rng: np.random.Generator) -> Material:
-    """Return a material of any colour, plain ones more often than any texture."""
+    """Return a material of any color, plain ones more often than any texture."""
     texture = "plain" if rng.random() < 0.4 else TEXTURES[rng.integers(len(TEXTURES))]
-    return Material(draw_colour(rng), 0.1, texture)
+    return Material(draw_color(rng), 0.1, texture)
 
 
-def draw_colour(rng: np.random.Generator, vivid: float = 1.0) -> Colour:
-    """Return a colour, sRGB in [0, 1]; the saturation goes up to `vivid`, and pale ones are more frequent."""
+def draw_color(rng: np.random.Generator, vivid: float = 1.0) -> Color:
+    """Return a color, sRGB in [0, 1]; the saturation goes up to `vivid`, and pale ones are more frequent."""
     return colorsys.hsv_to_rgb(rng.random(), vivid * rng.random() ** 1.7, rng.uniform(0.05, 1.0))
 
 
@@ -100,8 +100,8 @@ def _furniture(rng: np.random.Generator, x: float, y: float, height: float) -> l
     if kind == 4:  # a shelf
         broad, high, material = rng.uniform(0.6, 2.0), rng.uniform(0.8, 2.1), draw_material(rng)
         boards = [Box((x, y, z), (broad, 0.35, 0.03), material, yaw) for z in np.arange(0.1, high, 0.4).tolist()]
-        books = Material(draw_colour(rng), 0.1, "spines")
-        return [*boards, *(Box((x, y, b.centre[2] + 0.15), (0.8 * broad, 0.2, 0.26), books, yaw) for b in boards[::2])]
+        books = Material(draw_color(rng), 0.1, "spines")
+        return [*boards, *(Box((x, y, b.center[2] + 0.15), (0.8 * broad, 0.2, 0.26), books, yaw) for b in boards[::2])]
     # a person's rival: slim parts upon each other, as a plant, a coat stand or a floor lamp
     parts: list[Box | Cylinder] = []
     z = 0.0
@@ -117,15 +117,15 @@ def _furniture(rng: np.random.Generator, x: float, y: float, height: float) -> l
     return parts
 
 
-def _recoloured(scene: Scene, rng: np.random.Generator) -> Scene:
-    """Return the scene with each of its materials half-way, at most, to a colour of chance."""
+def _recolored(scene: Scene, rng: np.random.Generator) -> Scene:
+    """Return the scene with each of its materials half-way, at most, to a color of chance."""
     changed: dict[Material, Material] = {}
 
     def other(material: Material) -> Material:
         if material not in changed:
-            share, aim = 0.5 * rng.random(), draw_colour(rng)
-            red, green, blue = (c + share * (a - c) for c, a in zip(material.colour, aim, strict=True))
-            changed[material] = dataclasses.replace(material, colour=(red, green, blue))
+            share, aim = 0.5 * rng.random(), draw_color(rng)
+            red, green, blue = (c + share * (a - c) for c, a in zip(material.color, aim, strict=True))
+            changed[material] = dataclasses.replace(material, color=(red, green, blue))
         return changed[material]
 
     parts = tuple(dataclasses.replace(part, material=other(part.material)) for part in scene.primitives)

@@ -168,7 +168,7 @@ class _Run:
         kernels = [p for p in self.network.parameters() if p.ndim > 1]
         others = [p for p in self.network.parameters() if p.ndim <= 1]
         groups = [{"params": kernels, "weight_decay": config.weight_decay}, {"params": others, "weight_decay": 0.0}]
-        self.optimiser = torch.optim.AdamW(groups, lr=config.rate)
+        self.optimizer = torch.optim.AdamW(groups, lr=config.rate)
         self.step, self.seconds = 0, 0.0
         test = without_augmentation(dataclasses.replace(config.data, pictures_per_scene=2))
         self.test = SampleSource(TEST_SEED, test)
@@ -204,7 +204,7 @@ class _Run:
         yield from loader
 
     def _learn(self, pictures: torch.Tensor, targets: list[torch.Tensor]) -> Loss:
-        for group in self.optimiser.param_groups:
+        for group in self.optimizer.param_groups:
             group["lr"] = self._rate(self.step)
         inputs = to_tensor(pictures.to(self.device, non_blocking=True))
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.precision == "bfloat16"):
@@ -212,10 +212,10 @@ class _Run:
         loss = multibox_loss(logits.float(), coded.float(), *(part.to(self.device) for part in targets))
         if not torch.isfinite(loss.total):
             raise FloatingPointError(f"the loss is {float(loss.total)} at step {self.step}; lower the rate")
-        self.optimiser.zero_grad(set_to_none=True)
+        self.optimizer.zero_grad(set_to_none=True)
         loss.total.backward()  # type: ignore[no-untyped-call]
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.config.clip)
-        self.optimiser.step()
+        self.optimizer.step()
         keep = min(self.config.average, (1 + self.step) / (10 + self.step))
         with torch.no_grad():
             for mean, now in zip(self.averaged.state_dict().values(), self.network.state_dict().values(), strict=True):
@@ -242,7 +242,7 @@ class _Run:
             "precision": self.precision,
             "network": self.network.state_dict(),
             "averaged": self.averaged.state_dict(),
-            "optimiser": self.optimiser.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
         }
         torch.save(state, self.out / "state.tmp")
         (self.out / "state.tmp").replace(self.out / "state.pt")
@@ -258,7 +258,7 @@ class _Run:
         self.step, self.seconds, self.precision = state["step"], state["seconds"], state["precision"]
         self.network.load_state_dict(state["network"])
         self.averaged.load_state_dict(state["averaged"])
-        self.optimiser.load_state_dict(state["optimiser"])
+        self.optimizer.load_state_dict(state["optimizer"])
 
 
 class _Batches(Dataset):

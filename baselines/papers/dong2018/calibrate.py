@@ -5,8 +5,8 @@
 2. The emulated sensor keeps the shape that the rule `SHAPE_RULE` has; one scale per scene and quantity makes its RMSE
    the paper's No filter row. The family has other shapes, scaled in the same way.
 3. R is the covariance without outliers. Q is the smallest whole multiple of (r dt)^2 at which clean measurements are
-   inflated in fewer than 2 alpha of the steps on that axis (`papers`: the largest unmodelled rates r). The augmented
-   filter's density follows the same rule, in multiples of a^2 dt, a the largest unmodelled acceleration.
+   inflated in fewer than 2 alpha of the steps on that axis (`papers`: the largest unmodeled rates r). The augmented
+   filter's density follows the same rule, in multiples of a^2 dt, a the largest unmodeled acceleration.
 """
 
 from __future__ import annotations
@@ -26,13 +26,15 @@ import numpy as np
 
 from baselines.benchmark.build import CAMERA
 from baselines.benchmark.cells import DEPTH_RULES, SCENES
+from baselines.followers.build import make_estimator
 from baselines.followers.calibration import NoiseModel
-from baselines.followers.policy import Follower, make_estimator, make_perception, perceive_measurement, perceive_state
+from baselines.followers.follower import Follower
+from baselines.followers.perception import make_perception, perceive_measurement, perceive_state
 from baselines.papers.dong2018.table1 import PAPER_RMSE
 from follow_env.config import CameraConfig, MeasurementConfig
 from follow_env.envs.follow import FollowEnv
 from tracker.depth import RULES, Rule
-from tracker.estimators.filters import LockOutWarning, NoFilter
+from tracker.estimators import LockOutWarning, NoFilter
 
 DT = 1.0 / 30.0
 ALPHA = 0.05
@@ -59,8 +61,8 @@ def main(out: Path, jobs: int = 1) -> dict[str, Any]:
     """Measure and fit, write the calibration to `out` (JSON) and return its content."""
     seeds = range(FIRST_SEED, FIRST_SEED + FRAME_EPISODES)
     with ProcessPoolExecutor(jobs) as pool:
-        frames = {scene: _summarise(list(pool.map(_frame_errors, [scene] * len(seeds), seeds))) for scene in SCENES}
-        motion = _largest(list(pool.map(_unmodelled_motion, [s for s in SCENES for _ in seeds], [*seeds] * 2)))
+        frames = {scene: _summarize(list(pool.map(_frame_errors, [scene] * len(seeds), seeds))) for scene in SCENES}
+        motion = _largest(list(pool.map(_unmodeled_motion, [s for s in SCENES for _ in seeds], [*seeds] * 2)))
         sensors = {"default": dict.fromkeys(SCENES, dataclasses.asdict(MeasurementConfig()))}
         for name, shape in _shapes(frames).items():
             sensors[name] = {scene: dataclasses.asdict(_fit(shape(scene), *PAPER_NO_FILTER[scene])) for scene in SCENES}
@@ -86,7 +88,7 @@ def main(out: Path, jobs: int = 1) -> dict[str, Any]:
             "paper_no_filter_rad_m": PAPER_NO_FILTER,
         },
         "frames": frames,
-        "largest_unmodelled_motion": motion,
+        "largest_unmodeled_motion": motion,
         "sensors": sensors,
         "noise": {name: {scene: next(noise) for scene in SCENES} for name in wanted},
     }
@@ -132,7 +134,7 @@ def _frame_errors(scene: str, seed: int) -> dict[str, Samples]:
     return errors
 
 
-def _summarise(episodes: Sequence[dict[str, Samples]]) -> dict[str, dict[str, Any]]:
+def _summarize(episodes: Sequence[dict[str, Samples]]) -> dict[str, dict[str, Any]]:
     """Return, for each rule, the statistics of its errors over the episodes."""
     return {rule: error_statistics([episode[rule] for episode in episodes], DT) for rule in RULES}
 
@@ -251,7 +253,7 @@ def _fit(shape: MeasurementConfig, bearing_rmse: float, distance_rmse: float) ->
     )
 
 
-def _unmodelled_motion(scene: str, seed: int) -> tuple[float, float, float, float]:
+def _unmodeled_motion(scene: str, seed: int) -> tuple[float, float, float, float]:
     """Return the largest |rate| and |acceleration| per axis that the robot's twist does not explain in an episode."""
     env, driver, state = FollowEnv(scene, obs="state"), truth_driver(), None
     observation, info = env.reset(seed=seed)
@@ -287,7 +289,7 @@ def noise_by_rule(scene: str, sensor: MeasurementConfig, motion: dict[str, float
     Args:
         scene: in which the clean measurements are simulated.
         sensor: its errors.
-        motion: the largest unmodelled rates and accelerations.
+        motion: the largest unmodeled rates and accelerations.
         every: only every so many-th step is measured. Q must cover (r T)^2 over the time T between measurements, so
             each of the n steps takes n (r dt)^2; the density's unit is a^2 T.
     """

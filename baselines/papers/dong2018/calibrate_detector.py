@@ -41,7 +41,7 @@ TRACKER = TrackerSettings.for_rate(1.0 / DT)
 def main(weights: Path, out: Path, jobs: int = 1) -> dict[str, Any]:
     """Measure the detector with these weights, write its calibration to `out` (JSON) and return its content."""
     seeds = range(FIRST_SEED, FIRST_SEED + RULE_EPISODES)
-    motion = calibration.settings()["largest_unmodelled_motion"]
+    motion = calibration.settings()["largest_unmodeled_motion"]
     with ProcessPoolExecutor(jobs) as pool:
         play = functools.partial(_play, weights)
         errors = {scene: list(pool.map(play, [scene] * len(seeds), seeds)) for scene in SCENES}

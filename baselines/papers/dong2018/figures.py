@@ -30,7 +30,7 @@ _FIGURE_NUMBERS = {
 _BLACK, _ORANGE, _SKY, _GREEN, _BLUE, _VERMILION, _PURPLE = (
     *("#000000", "#E69F00", "#56B4E9", "#009E73"),
     *("#0072B2", "#D55E00", "#CC79A7"),
-)  # Okabe and Ito's colours, which colour-blind readers can tell apart
+)  # Okabe and Ito's colors, which color-blind readers can tell apart
 _LINES = {
     "none": (_BLACK, "-"),
     "kf": (_BLUE, "--"),
@@ -96,15 +96,15 @@ def draw_sensitivity(records: Sequence[Record], path: Path) -> None:
         panels = _panels(figure, share_y="col")
         for scene, quantity, axes in panels:
             chosen = _select(records, scene=scene, quantity=quantity)
-            colour, dashes = _LINES["kf"]
-            _draw_ratios(axes, _select(chosen, estimator="kf"), "KF", (colour, dashes, "o"), shift=0.94)
+            color, dashes = _LINES["kf"]
+            _draw_ratios(axes, _select(chosen, estimator="kf"), "KF", (color, dashes, "o"), shift=0.94)
             for alpha, shift in zip(ALPHAS, (0.98, 1.02, 1.06), strict=True):
                 lines = _select(chosen, estimator="akf", alpha=alpha)
                 _draw_ratios(axes, lines, f"AKF, α = {alpha:g}", _ALPHA_LINES[alpha], shift)
             axes.axhline(1.0, color="#808080", linewidth=0.8)
-            for estimator, (colour, _) in (("kf", _LINES["kf"]), ("akf", _LINES["akf"])):
+            for estimator, (color, _) in (("kf", _LINES["kf"]), ("akf", _LINES["akf"])):
                 ratio = _column(_select(chosen, estimator=estimator), "paper_ratio")[0]
-                axes.axhline(ratio, color=colour, linewidth=3.0, alpha=0.25, label=f"paper, {NAMES[estimator]}")
+                axes.axhline(ratio, color=color, linewidth=3.0, alpha=0.25, label=f"paper, {NAMES[estimator]}")
             axes.set_xscale("log")
             scales = sorted({float(str(record["q_scale"])) for record in chosen if record["q_scale"] is not None})
             axes.set_xticks(scales, [f"{scale:g}" for scale in scales])
@@ -134,7 +134,7 @@ def draw_sensors(records: Sequence[Record], path: Path) -> None:
         for scene, quantity, axes in panels:
             chosen = _select(records, scene=scene, quantity=quantity)
             for estimator, marker, offset in (("kf", "o", -0.16), ("akf", "D", 0.16)):
-                colour = _LINES[estimator][0]
+                color = _LINES[estimator][0]
                 for row, sensor in enumerate(sensors):
                     for record in _select(chosen, estimator=estimator, sensor=sensor):
                         ratio, low, high = _ratio_and_errors(record)
@@ -142,7 +142,7 @@ def draw_sensors(records: Sequence[Record], path: Path) -> None:
                             ratio,
                             row + offset,
                             xerr=[[low], [high]],
-                            color=colour,
+                            color=color,
                             marker=marker,
                             markersize=4.5,
                             linestyle="none",
@@ -150,7 +150,7 @@ def draw_sensors(records: Sequence[Record], path: Path) -> None:
                         )
                 axes.axvline(
                     _column(_select(chosen, estimator=estimator), "paper_ratio")[0],
-                    color=colour,
+                    color=color,
                     linewidth=3.0,
                     alpha=0.25,
                     label=f"paper, {NAMES[estimator]}",
@@ -166,22 +166,22 @@ def draw_sensors(records: Sequence[Record], path: Path) -> None:
 
 
 def _draw_curve(axes: Axes, records: Sequence[Record], estimator: str) -> None:
-    colour, dashes = _LINES[estimator]
+    color, dashes = _LINES[estimator]
     times = _column(records, "time_s")
-    axes.fill_between(times, _column(records, "p10"), _column(records, "p90"), color=colour, alpha=0.13, linewidth=0.0)
-    axes.plot(times, _column(records, "mean"), color=colour, linestyle=dashes, label=NAMES[estimator])
+    axes.fill_between(times, _column(records, "p10"), _column(records, "p90"), color=color, alpha=0.13, linewidth=0.0)
+    axes.plot(times, _column(records, "mean"), color=color, linestyle=dashes, label=NAMES[estimator])
 
 
 def _draw_ratios(axes: Axes, records: Sequence[Record], label: str, line: tuple[str, str, str], shift: float) -> None:
     """Draw one line of ratios with intervals, shifted by a factor along the logarithmic axis so that none hide."""
     known = _known(records, "ratio_to_none")
     values = [_ratio_and_errors(record) for record in known]
-    colour, dashes, marker = line
+    color, dashes, marker = line
     axes.errorbar(
         [scale * shift for scale in _column(known, "q_scale")],
         [ratio for ratio, _, _ in values],
         yerr=[[low for _, low, _ in values], [high for _, _, high in values]],
-        color=colour,
+        color=color,
         linestyle=dashes,
         marker=marker,
         markersize=4.0,

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from baselines.benchmark import provenance as configuration
+from baselines.benchmark import provenance
 from baselines.benchmark.files import write_csv, write_text
-from baselines.benchmark.metrics.episode import episode as metrics
-from baselines.benchmark.metrics.episode import tracking
+from baselines.benchmark.metrics import episode as metrics
+from baselines.benchmark.metrics import tracking
 from baselines.benchmark.provenance import Plan
 from baselines.benchmark.rollout import EpisodeFunction
 from baselines.benchmark.run import Played, rows, run
@@ -42,9 +42,9 @@ def reproduce(
     Returns:
         The report, ``table1.md`` without its figures.
     """
-    settings = configuration.settings(calibration)
-    config = configuration.document(plan, settings, out, jobs)
-    digest = configuration.run_digest(settings)
+    settings = provenance.settings(calibration)
+    config = provenance.document(plan, settings, out, jobs)
+    digest = provenance.run_digest(settings)
     return run(plan.tasks(), digest, config, episode, lambda store: _write(plan, store, out), out, jobs, resume)
 
 

@@ -5,7 +5,7 @@
 **Right and wrong.** In a frame with an accepted measurement the tracker is wrong if the measured place on the floor is
 nearer to the other person's body than to the target's, unless it is at the target's all the same (`TOUCH`): the two
 brush past each other. It is at nobody's if it is far from both. A body is all of it: one that bends forward is measured
-at its head, half a metre before its middle. Boxes would not tell: when the other one stands behind the target, both
+at its head, half a meter before its middle. Boxes would not tell: when the other one stands behind the target, both
 true boxes lie in the same place of the picture. A switch is a wrong frame after a right one.
 
 **Hidden.** The target is visible while at least half of its pixels are; the occlusion starts with the first processed
@@ -249,8 +249,8 @@ def _draw_frame(axes: Axes, frame: Frame) -> None:
     for detection in frame.found:
         u0, v0, u1, v1 = detection.box
         is_target = tracked is not None and overlap(detection.box, tracked) == most
-        colour, width = (_GREEN, 2.4) if is_target else (_VERMILION, 1.2)
-        axes.add_patch(Rectangle((u0, v0), u1 - u0, v1 - v0, edgecolor=colour, facecolor="none", linewidth=width))
+        color, width = (_GREEN, 2.4) if is_target else (_VERMILION, 1.2)
+        axes.add_patch(Rectangle((u0, v0), u1 - u0, v1 - v0, edgecolor=color, facecolor="none", linewidth=width))
     axes.set_xlim(0, frame.shown.rgb.shape[1])
     axes.set_ylim(frame.shown.rgb.shape[0], 0)
     axes.set_xticks([])

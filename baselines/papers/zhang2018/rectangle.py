@@ -96,7 +96,7 @@ def play(posture: str, detector: Detector | None = None) -> Walk:
     gaps = {name: _frame_at(station) for name, station in GAPS.items()}
     for frame in range(_frame_at(_length()) + round(STANDING / PERIOD) + 1):
         time = frame * PERIOD
-        walked, speed = _travelled(time)
+        walked, speed = _traveled(time)
         x, y, heading = _on_path(walked)
         cosine, sine = math.cos(heading), math.sin(heading)
         pelvis_x = CAMERA.x + x - cosine * ahead + sine * left
@@ -180,8 +180,8 @@ def _middle(walker: Walker, posture: str) -> tuple[float, float]:
     return float(ahead), float(left)
 
 
-def _travelled(time: float) -> tuple[float, float]:
-    """Return the metres walked and the speed: stand, accelerate, walk, brake, stand."""
+def _traveled(time: float) -> tuple[float, float]:
+    """Return the meters walked and the speed: stand, accelerate, walk, brake, stand."""
     length = _length()
     ramp = SPEED / ACCELERATION
     cruise = length / SPEED - ramp
@@ -207,7 +207,7 @@ def _sides() -> list[tuple[tuple[float, float], tuple[float, float]]]:
 def _frame_at(walked: float) -> int:
     """Return the first processed frame at which so much has been walked."""
     frame = 0
-    while _travelled(frame * PERIOD)[0] < walked - 1e-9:
+    while _traveled(frame * PERIOD)[0] < walked - 1e-9:
         frame += 1
     return frame
 
@@ -326,15 +326,15 @@ def _from_path(row: Mapping[str, Value], name: str, offset: float) -> float:
     return nearest
 
 
-_BLACK, _GREEN, _VERMILION, _GREY = "#000000", "#009E73", "#D55E00", "#b3b3b3"
+_BLACK, _GREEN, _VERMILION, _GRAY = "#000000", "#009E73", "#D55E00", "#b3b3b3"
 
 
 def _draw_plan(axes: Axes, walk: Sequence[Mapping[str, Value]]) -> None:
     closed = [*CORNERS, CORNERS[0]]
     axes.plot([-y for _, y in closed], [x for x, _ in closed], color=_BLACK, linewidth=1.2)
-    for name, colour, marker in (("measured", _GREEN, "o"), ("estimated", _VERMILION, "x")):
+    for name, color, marker in (("measured", _GREEN, "o"), ("estimated", _VERMILION, "x")):
         places = [_place(row, name) for row in walk if row[f"{name}_x"] is not None]
-        axes.plot([-y for _, y, _ in places], [x for x, _, _ in places], marker, color=colour, markersize=2.5)
+        axes.plot([-y for _, y, _ in places], [x for x, _, _ in places], marker, color=color, markersize=2.5)
     axes.set_aspect("equal")
     axes.set_ylabel("depth (m)")
 
@@ -342,16 +342,16 @@ def _draw_plan(axes: Axes, walk: Sequence[Mapping[str, Value]]) -> None:
 def _draw_depth(axes: Axes, walk: Sequence[Mapping[str, Value]]) -> None:
     for name in dict.fromkeys(row["gap"] for row in walk if row["gap"] is not None):
         times = [float(str(row["time"])) for row in walk if row["gap"] == name]
-        axes.axvspan(times[0] - 0.5 * PERIOD, times[-1] + 0.5 * PERIOD, color=_GREY, alpha=0.5, linewidth=0.0)
+        axes.axvspan(times[0] - 0.5 * PERIOD, times[-1] + 0.5 * PERIOD, color=_GRAY, alpha=0.5, linewidth=0.0)
     lines = (
         ("truth", "reference path", _BLACK, "-", ""),
         ("measured", "measured", _GREEN, "", "o"),
         ("estimated", "estimated or predicted", _VERMILION, "", "x"),
     )
-    for name, label, colour, dashes, marker in lines:
+    for name, label, color, dashes, marker in lines:
         known = [row for row in walk if row[f"{name}_x"] is not None]
         times, depths = [float(str(row["time"])) for row in known], [_place(row, name)[0] for row in known]
         axes.plot(
-            times, depths, color=colour, linestyle=dashes, marker=marker, markersize=2.5, linewidth=1.2, label=label
+            times, depths, color=color, linestyle=dashes, marker=marker, markersize=2.5, linewidth=1.2, label=label
         )
     axes.set_ylabel("depth (m)")

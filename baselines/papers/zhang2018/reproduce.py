@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from baselines.benchmark import provenance as configuration
+from baselines.benchmark import provenance
 from baselines.benchmark.files import write_csv, write_text
 from baselines.benchmark.run import complete
 from baselines.benchmark.store import Store
@@ -53,10 +53,10 @@ def reproduce(
     plan = {name: tasks(name, episodes or EPISODES) for name in experiments}
     settings = _settings(weights)
     code = [Path(str(module.__file__)) for module in _CODE]
-    digest = configuration.run_digest(settings, *code)
+    digest = provenance.run_digest(settings, *code)
     parts = {name: list(dict.fromkeys(part for part, _ in planned)) for name, planned in plan.items()}
     seeds = {name: sorted({seed for _, seed in planned}) for name, planned in plan.items()}
-    config = configuration.text(settings, digest, parts, seeds, out, jobs)
+    config = provenance.text(settings, digest, parts, seeds, out, jobs)
 
     def write(store: Store, done: str) -> str:
         text = _write(plan, store, detectors, out)
@@ -100,7 +100,7 @@ def _write(plan: Mapping[str, Sequence[tuple[Part, int]]], store: Store, detecto
 
 _HEAD = f"""# Paper A's experiments, reproduced
 
-In the cabin scene, with rendered people and the Xtion's errors in colour and depth. `{OURS}` has the paper's shared
+In the cabin scene, with rendered people and the Xtion's errors in color and depth. `{OURS}` has the paper's shared
 features and 2252 priors, `{SSD}` SSD's 8732 priors without them; both have the same light trunk in the place of VGG-16.
 A net without weights is left out. Boxes: `mask` are the true ones, `detector` those of `{OURS}`. Speed is in
 `timing.md`."""

@@ -1,4 +1,4 @@
-"""The six sequences of paper A's Table 2, made again: three colours of clothes in two views, turning in every posture.
+"""The six sequences of paper A's Table 2, made again: three colors of clothes in two views, turning in every posture.
 
 The paper shows volunteers on the ground; here it is our people, with the headstand that the paper could not test.
 """
@@ -31,7 +31,7 @@ TURNS = 1.0
 
 @dataclass(frozen=True)
 class Sequence:
-    """A row of Table 2: a colour of `SUITS`, a view (1 or 2) and the number of frames."""
+    """A row of Table 2: a color of `SUITS`, a view (1 or 2) and the number of frames."""
 
     suit: str
     view: int
@@ -65,7 +65,7 @@ def play(sequence: Sequence, frames: Iterable[int] | None = None) -> Iterator[RG
     """
     camera = PinholeCamera(CameraConfig())
     renderer, config = RasterRenderer(make_scene(SCENE), camera), SensorConfig()
-    sensor = RGBDSensor(config.depth, config.colour, camera)
+    sensor = RGBDSensor(config.depth, config.color, camera)
     walker = Walker(load_body("man", SUITS[sequence.suit], "high"))
     for frame in range(sequence.frames) if frames is None else frames:
         share = math.fmod(frame * len(POSTURES) / sequence.frames, 1.0)

@@ -68,7 +68,7 @@ class Stage:
         self._empty = dataclasses.replace(cabin, primitives=())
         self._camera = camera
         self._alone: dict[int, RasterRenderer] = {}
-        self._sensor = RGBDSensor(sensor.depth, sensor.colour, camera)
+        self._sensor = RGBDSensor(sensor.depth, sensor.color, camera)
 
     def take(self, people: Sequence[Placed], noise: int) -> Picture:
         """Return the picture of people (their ids differ) with the sensor errors that `noise` stands for."""

@@ -1,4 +1,4 @@
-"""Paper A's Table 2: a subject in three colours turns in every posture before two cameras; which net misses it less?
+"""Paper A's Table 2: a subject in three colors turns in every posture before two cameras; which net misses it less?
 
 Both nets see the same pictures, with the sensor's errors.
 """

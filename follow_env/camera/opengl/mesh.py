@@ -35,16 +35,16 @@ class Triangles(NamedTuple):
 def scene_triangles(scene: Scene) -> Triangles:
     """Return the floor and the primitives of `scene` as triangles."""
     x0, x1, y0, y1 = scene.bounds
-    centre, size = (0.5 * (x0 + x1), 0.5 * (y0 + y1), -0.5 * FLOOR_THICKNESS), (x1 - x0, y1 - y0, FLOOR_THICKNESS)
+    center, size = (0.5 * (x0 + x1), 0.5 * (y0 + y1), -0.5 * FLOOR_THICKNESS), (x1 - x0, y1 - y0, FLOOR_THICKNESS)
     parts = []
-    for primitive in (Box(centre, size, scene.floor), *scene.primitives):
-        parts += [_coloured(patch, primitive.material) for patch in _PATCHES[type(primitive)](primitive)]
+    for primitive in (Box(center, size, scene.floor), *scene.primitives):
+        parts += [_colored(patch, primitive.material) for patch in _PATCHES[type(primitive)](primitive)]
     return _joined(parts)
 
 
 def person_triangles(mesh: Mesh) -> Triangles:
     """Return what does not move of a person's `mesh`; the vertices are zeros."""
-    looks = np.column_stack((mesh.colours, -mesh.pattern.astype(np.float32)))
+    looks = np.column_stack((mesh.colors, -mesh.pattern.astype(np.float32)))
     return Triangles(np.zeros((len(mesh.anchors), 6), np.float32), mesh.anchors, mesh.faces, looks)
 
 
@@ -72,25 +72,25 @@ def _box(box: Box) -> Iterable[_Patch]:
             own[:, second] = half[second] * np.array((-1.0, -1.0, 1.0, 1.0))
             anchors = np.column_stack((own[:, first], own[:, second], np.zeros(4)))
             normals = np.tile(sign * frame[axis], (4, 1))
-            yield _Patch(box.centre + own @ frame, normals, anchors, np.array([(0, 1, 2), (0, 2, 3)]))
+            yield _Patch(box.center + own @ frame, normals, anchors, np.array([(0, 1, 2), (0, 2, 3)]))
 
 
 def _cylinder(cylinder: Cylinder) -> Iterable[_Patch]:
     """Yield the side and the two ends."""
     radius, half = cylinder.radius, 0.5 * cylinder.height
-    yield _turned(cylinder.centre, [(radius, -half, 1.0, 0.0), (radius, half, 1.0, 0.0)], curved=True)
+    yield _turned(cylinder.center, [(radius, -half, 1.0, 0.0), (radius, half, 1.0, 0.0)], curved=True)
     for up in (-1.0, 1.0):
-        yield _turned(cylinder.centre, [(0.0, up * half, 0.0, up), (radius, up * half, 0.0, up)], curved=False)
+        yield _turned(cylinder.center, [(0.0, up * half, 0.0, up), (radius, up * half, 0.0, up)], curved=False)
 
 
 def _sphere(sphere: Sphere) -> Iterable[_Patch]:
-    yield _turned(sphere.centre, [*_quarter(sphere.radius, -1), *_quarter(sphere.radius, 1)[1:]], curved=True)
+    yield _turned(sphere.center, [*_quarter(sphere.radius, -1), *_quarter(sphere.radius, 1)[1:]], curved=True)
 
 
 def _capsule(capsule: Capsule) -> Iterable[_Patch]:
     """Yield the straight part and the two half spheres."""
-    (x, y, z), radius, half = capsule.centre, capsule.radius, 0.5 * capsule.straight
-    yield _turned(capsule.centre, [(radius, -half, 1.0, 0.0), (radius, half, 1.0, 0.0)], curved=True)
+    (x, y, z), radius, half = capsule.center, capsule.radius, 0.5 * capsule.straight
+    yield _turned(capsule.center, [(radius, -half, 1.0, 0.0), (radius, half, 1.0, 0.0)], curved=True)
     for up in (-1, 1):
         yield _turned((x, y, z + up * half), _quarter(radius, up), curved=True)
 
@@ -111,12 +111,12 @@ def _quarter(radius: float, up: int) -> list[tuple[float, float, float, float]]:
 
 
 def _turned(
-    centre: tuple[float, float, float], profile: Sequence[tuple[float, float, float, float]], curved: bool
+    center: tuple[float, float, float], profile: Sequence[tuple[float, float, float, float]], curved: bool
 ) -> _Patch:
-    """Return the surface that a profile makes when it turns about the upright axis through `centre`.
+    """Return the surface that a profile makes when it turns about the upright axis through `center`.
 
     Args:
-        centre: m.
+        center: m.
         profile: radius and height (m), and the normal's parts outward and upward, of each corner of the profile.
         curved: whether the texture runs around the axis; on a flat end it lies in the plane.
     """
@@ -135,10 +135,10 @@ def _turned(
     faces = np.concatenate(
         (np.column_stack((low, after, after + SIDES)), np.column_stack((low, after + SIDES, low + SIDES)))
     )
-    return _Patch(own + centre, normals, np.column_stack((*texture, np.full(len(own), float(curved)))), faces)
+    return _Patch(own + center, normals, np.column_stack((*texture, np.full(len(own), float(curved)))), faces)
 
 
-def _coloured(patch: _Patch, material: Material) -> Triangles:
+def _colored(patch: _Patch, material: Material) -> Triangles:
     """Leave out faces without area, turn the others outward and give them the material's look."""
     a, b, c = (patch.positions[patch.faces[:, k]] for k in range(3))
     outward = (np.cross(b - a, c - a) * patch.normals[patch.faces].sum(axis=1)).sum(axis=1)
@@ -147,7 +147,7 @@ def _coloured(patch: _Patch, material: Material) -> Triangles:
         np.hstack((patch.positions, patch.normals)).astype(np.float32),
         patch.anchors.astype(np.float32),
         faces.astype(np.int32),
-        np.tile(np.array((*material.colour, TEXTURES.index(material.texture)), np.float32), (len(faces), 1)),
+        np.tile(np.array((*material.color, TEXTURES.index(material.texture)), np.float32), (len(faces), 1)),
     )
 
 

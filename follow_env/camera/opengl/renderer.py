@@ -34,13 +34,13 @@ SHADOW_BIAS = (4.0, 4.0)
 class OpenGLRenderer:
     """Draws `scene` and people with OpenGL 3.3.
 
-    Depth, ids and textures are those of `RasterRenderer`, colours to about a grey level; the last bits depend on the
+    Depth, ids and textures are those of `RasterRenderer`, colors to about a gray level; the last bits depend on the
     driver. A pixel that sees nothing within `far` has depth `far` and id 0. A renderer belongs to the process that
     made it.
 
     Args:
         scene: the place.
-        camera: the intrinsics; with `supersample` 2 colours are averages, depth and ids those of the pixel centres.
+        camera: the intrinsics; with `supersample` 2 colors are averages, depth and ids those of the pixel centers.
         shadows: whether things stand in the lamps' direct light; the default camera draws no shadows.
 
     Raises:
@@ -83,7 +83,7 @@ class OpenGLRenderer:
             ValueError: if the camera's pose or a vertex is not finite, or the process is a fork of the renderer's.
         """
         if not all(map(math.isfinite, (camera.x, camera.y, camera.z, camera.yaw))):
-            raise ValueError(f"the camera's pose is {camera!r}; expected finite numbers in metres and radians")
+            raise ValueError(f"the camera's pose is {camera!r}; expected finite numbers in meters and radians")
         self._require_own_process()
         with self._context as context:
             self._place(context, people)
@@ -91,12 +91,12 @@ class OpenGLRenderer:
                 self._cast(context)
             self._surface["eye"] = camera.x, camera.y, camera.z
             self._surface["projection"].write(self._projection(camera))
-            colours, depth = self._draw(self._target)
-            ids = np.ascontiguousarray(colours[..., 3])
+            colors, depth = self._draw(self._target)
+            ids = np.ascontiguousarray(colors[..., 3])
             if self._fine is not None:
                 self._draw(self._fine)
-                colours = self._fine.halved_colours()
-        return RGBDFrame(np.ascontiguousarray(colours[..., :3]), depth, ids)
+                colors = self._fine.halved_colors()
+        return RGBDFrame(np.ascontiguousarray(colors[..., :3]), depth, ids)
 
     def close(self) -> None:
         """Free the context and all that is in it; a second call does nothing."""
@@ -126,7 +126,7 @@ class OpenGLRenderer:
         """Send the people's vertices; make their buffers again only when other meshes or ids come."""
         points = [np.hstack((person.vertices, person.normals)) for person in people]
         if not all(np.isfinite(array).all() for array in points):
-            raise ValueError("a person has a vertex that is not finite; expected world coordinates in metres")
+            raise ValueError("a person has a vertex that is not finite; expected world coordinates in meters")
         meshes = [(person.mesh, person.id) for person in people]
         same = len(meshes) == len(self._meshes) and all(
             new[0] is old[0] and new[1] == old[1] for new, old in zip(meshes, self._meshes, strict=True)
@@ -175,15 +175,15 @@ class OpenGLRenderer:
 
 
 class _Target:
-    """A picture to draw into: colours with ids in the fourth channel, and depth in m."""
+    """A picture to draw into: colors with ids in the fourth channel, and depth in m."""
 
     def __init__(self, context: Any, width: int, height: int) -> None:
         self.width, self._shape = width, (height, width)
-        self._colours = context.texture((width, height), 4)
+        self._colors = context.texture((width, height), 4)
         self._depth = context.texture((width, height), 1, dtype="f4")
         nearest = context.depth_renderbuffer((width, height))
         self._only_depth = context.framebuffer(self._depth)
-        self._buffer = context.framebuffer((self._colours, self._depth), nearest)
+        self._buffer = context.framebuffer((self._colors, self._depth), nearest)
 
     def clear(self, far: float) -> None:
         """Make the picture empty and draw into it from now on."""
@@ -193,18 +193,18 @@ class _Target:
         self._buffer.use()
 
     def read(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return colours and ids (H, W, 4) uint8 and depth (H, W) float32."""
-        colours, depth = np.empty((*self._shape, 4), np.uint8), np.empty(self._shape, np.float32)
-        self._colours.read_into(colours)
+        """Return colors and ids (H, W, 4) uint8 and depth (H, W) float32."""
+        colors, depth = np.empty((*self._shape, 4), np.uint8), np.empty(self._shape, np.float32)
+        self._colors.read_into(colors)
         self._depth.read_into(depth)
-        return colours, depth
+        return colors, depth
 
-    def halved_colours(self) -> np.ndarray:
-        """Return the colours averaged over 2 x 2 pixels, (H / 2, W / 2, 4) uint8."""
-        colours = np.empty((self._shape[0] // 2, self._shape[1] // 2, 4), np.uint8)
-        self._colours.build_mipmaps(0, 1)
-        self._colours.read_into(colours, level=1)
-        return colours
+    def halved_colors(self) -> np.ndarray:
+        """Return the colors averaged over 2 x 2 pixels, (H / 2, W / 2, 4) uint8."""
+        colors = np.empty((self._shape[0] // 2, self._shape[1] // 2, 4), np.uint8)
+        self._colors.build_mipmaps(0, 1)
+        self._colors.read_into(colors, level=1)
+        return colors
 
 
 class _Drawable:

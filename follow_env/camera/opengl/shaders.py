@@ -135,7 +135,7 @@ uniform float focal, far, ambient, id;
 uniform vec4 lamps[LAMPS];
 uniform sampler2D looks;
 in vec3 point, normal, anchor;
-layout(location = 0) out vec4 colour;
+layout(location = 0) out vec4 color;
 layout(location = 1) out float depth;
 
 void main() {
@@ -157,6 +157,6 @@ void main() {
     } else if (kind < 0) {
         light *= dressed(-kind, anchor);
     }
-    colour = vec4(look.rgb * light, id);
+    color = vec4(look.rgb * light, id);
 }
 """

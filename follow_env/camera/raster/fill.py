@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Kernels that decide, within one tile of 16 x 16 pixels, what is nearest at every pixel centre.
+"""Kernels that decide, within one tile of 16 x 16 pixels, what is nearest at every pixel center.
 
 A tile is one flat float32 array of planes of 256 numbers, `lanes[PLANE + 16 * row + column]`, beside `seen` (256,)
 int32, the number of the surface at each pixel. Plane `DEPTH` holds 1/Z; nearer means greater, the first drawn wins a
@@ -13,7 +13,7 @@ from numba import njit
 
 TILE = 16
 PIXELS = np.uint64(TILE * TILE)
-# Planes of a tile: the pixel's ray, 1/Z, surface point, normal, texture coordinates, pixels per metre, light, Z.
+# Planes of a tile: the pixel's ray, 1/Z, surface point, normal, texture coordinates, pixels per meter, light, Z.
 X, Y, DEPTH, POINT_X, POINT_Y, POINT_Z, NORMAL_X, NORMAL_Y, S, T, SHARP, SHADE, LIGHT, DISTANCE, COLUMN = np.arange(
     0, 15 * TILE * TILE, TILE * TILE, dtype=np.uint64
 )

@@ -27,7 +27,7 @@ from follow_env.compilation import digest
 
 def _compiled(sources: int) -> Callable[..., int]:
     @njit(cache=True, nogil=True, error_model="numpy")
-    def draw(view, scene, people, work, first_row, last_row, coloured, rgb, depth, ids):
+    def draw(view, scene, people, work, first_row, last_row, colored, rgb, depth, ids):
         """Draw the rows of tiles `first_row` <= row < `last_row`; return 0, or -1 if a vertex is not finite.
 
         Args:
@@ -37,7 +37,7 @@ def _compiled(sources: int) -> Callable[..., int]:
             work: `Workspace`.
             first_row: first row of tiles.
             last_row: the row of tiles after the last.
-            coloured: whether `rgb` is wanted.
+            colored: whether `rgb` is wanted.
             rgb: (H, W, 3) uint8, out.
             depth: (H, W) float32, out, m.
             ids: (H, W) uint8, out.
@@ -49,12 +49,12 @@ def _compiled(sources: int) -> Callable[..., int]:
         triangle_count = find_triangles(view, people, scene, work)
         if triangle_count < 0:
             return -1
-        lanes, seen, colours, done = work.lanes, work.seen, work.colours, work.done
+        lanes, seen, colors, done = work.lanes, work.seen, work.colors, work.done
         facets, places, order, in_row = work.facets, work.places, work.order, work.row
         cylinders, cylinder_places, balls, ball_places = work.rounds, work.round_places, work.balls, work.ball_places
         triangles, triangle_places = work.triangles, work.triangle_places
         surfaces, textures, lamps = scene.surfaces, scene.textures, scene.lamps
-        names, pattern, albedo = people.ids, people.pattern, people.colours
+        names, pattern, albedo = people.ids, people.pattern, people.colors
         first_cylinder = 1 + FACES * scene.boxes.shape[0]
         first_ball = first_cylinder + CYLINDER_PARTS * scene.cylinders.shape[0]
         static = surfaces.shape[0]
@@ -83,14 +83,14 @@ def _compiled(sources: int) -> Callable[..., int]:
                 place = np.uint64(row * TILE), np.uint64(column * TILE), np.uint64(height), np.uint64(width)
                 _write_depth(*place, lanes, depth)
                 _write_ids(*place, stop > start, static, triangle_places, names, seen, ids)
-                if not coloured:
+                if not colored:
                     continue
                 if stop > start:
                     looks = triangle_places, pattern, albedo, triangles
-                    shade_triangles(height, width, static, *looks, lanes, seen, colours)
+                    shade_triangles(height, width, static, *looks, lanes, seen, colors)
                 lit = surfaces, textures, lamps, scene.ambient
-                _shade_surfaces(height, width, view, *lit, done, lanes, seen, colours)
-                _write_colours(*place, colours, rgb)
+                _shade_surfaces(height, width, view, *lit, done, lanes, seen, colors)
+                _write_colors(*place, colors, rgb)
         return 0
 
     return draw
@@ -159,8 +159,8 @@ def _fill_triangles(row, triangles, places, entries, start, stop, first, lanes, 
 
 
 @_inline
-def _shade_surfaces(height, width, view, surfaces, textures, lamps, ambient, done, lanes, seen, colours):
-    """Colour the pixels of the first `height` rows and `width` columns that see the scene or nothing.
+def _shade_surfaces(height, width, view, surfaces, textures, lamps, ambient, done, lanes, seen, colors):
+    """Color the pixels of the first `height` rows and `width` columns that see the scene or nothing.
 
     A surface is shaded once, from the first to the last row that shows it.
     """
@@ -172,7 +172,7 @@ def _shade_surfaces(height, width, view, surfaces, textures, lamps, ambient, don
             if number == previous or number >= surfaces.shape[0]:
                 continue
             if number == 0:
-                colours[k] = BACKGROUND
+                colors[k] = BACKGROUND
                 continue
             previous = number
             known = False
@@ -184,7 +184,7 @@ def _shade_surfaces(height, width, view, surfaces, textures, lamps, ambient, don
             number_done += 1
             start, stop = np.uint64(i * TILE), np.uint64(_last_row(seen, number, i, height) * TILE + TILE)
             texture = textures[number]
-            shade_surface(number, start, stop, view, surfaces, texture, lamps, ambient, lanes, seen, colours)
+            shade_surface(number, start, stop, view, surfaces, texture, lamps, ambient, lanes, seen, colors)
 
 
 @_inline
@@ -220,14 +220,14 @@ def _write_ids(y0, x0, rows, columns, any_triangle, first, places, names, seen, 
 
 
 @_inline
-def _write_colours(y0, x0, rows, columns, colours, rgb):
-    """Copy a tile's colours to its place in the picture."""
+def _write_colors(y0, x0, rows, columns, colors, rgb):
+    """Copy a tile's colors to its place in the picture."""
     for i in range(rows):
         for j in range(columns):
-            colour = colours[np.uint64(TILE) * i + j]
-            rgb[y0 + i, x0 + j, 0] = np.uint8(colour)
-            rgb[y0 + i, x0 + j, 1] = np.uint8(colour >> np.uint32(8))
-            rgb[y0 + i, x0 + j, 2] = np.uint8(colour >> np.uint32(16))
+            color = colors[np.uint64(TILE) * i + j]
+            rgb[y0 + i, x0 + j, 0] = np.uint8(color)
+            rgb[y0 + i, x0 + j, 1] = np.uint8(color >> np.uint32(8))
+            rgb[y0 + i, x0 + j, 2] = np.uint8(color >> np.uint32(16))
 
 
 draw = _compiled(digest(Path(__file__).parent.glob("*.py")))

@@ -19,7 +19,7 @@ _jit = njit(nogil=True, error_model="numpy")
 def find_triangles(view, people, scene, work):
     """Fill `work.triangles` with the triangles of people that may be seen; return how many, or -1 if one is not finite.
 
-    A triangle that meets no pixel centre is left out, and so is one turned away, unless an open border is near: then
+    A triangle that meets no pixel center is left out, and so is one turned away, unless an open border is near: then
     its back is drawn. Vertices are lit here, once each, and the light is interpolated over the triangle in perspective.
     """
     near = view.near
@@ -119,7 +119,7 @@ def _light_vertices(surface, first, last, lamps, ambient, front, back):
 
 @_jit
 def _pixels(start, stop, size, place, row, column):
-    """Write the first and last pixel whose centre may lie between two places in px; False if there is none."""
+    """Write the first and last pixel whose center may lie between two places in px; False if there is none."""
     if not (stop > -0.01 and start < size - 0.99):
         return False
     place[row, column] = math.ceil(max(start - 0.01, 0.0))

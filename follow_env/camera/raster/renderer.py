@@ -1,9 +1,9 @@
 """`RasterRenderer`: the default camera. Solids and people in one z-buffer, compiled by numba.
 
 Flat faces are half-planes and a linear 1/Z over the picture, cylinders are solved per column, balls (spheres and the
-ends of capsules) per pixel, people are triangles. The nearest at a pixel centre wins, and each visible pixel is shaded
+ends of capsules) per pixel, people are triangles. The nearest at a pixel center wins, and each visible pixel is shaded
 once. The rooms: `raster_scene` packs the scene, `raster_setup` and `raster_people` find what may be seen, `raster_fill`
-draws tiles, `raster_shade` colours them.
+draws tiles, `raster_shade` colors them.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ class RasterRenderer:
 
     Args:
         scene: the place.
-        camera: the intrinsics; with `supersample` 2 colours are averages, depth and ids those of the pixel centres.
+        camera: the intrinsics; with `supersample` 2 colors are averages, depth and ids those of the pixel centers.
         threads: threads that share a picture (or the cameras of a batch).
 
     Raises:
@@ -113,11 +113,11 @@ class RasterRenderer:
         sizes = len(people.vertices), len(people.faces)
         return people, [make_workspace(self._scene, *sizes) for _ in range(self._threads)]
 
-    def _draw(self, view: View, coloured: bool, frame: RGBDFrame) -> None:
+    def _draw(self, view: View, colored: bool, frame: RGBDFrame) -> None:
         """Draw the rows of tiles, one band a thread."""
         edges = [view.rows * k // self._threads for k in range(self._threads + 1)]
         jobs = [
-            (view, self._scene, self._people, work, first, last, coloured, frame.rgb, frame.depth, frame.ids)
+            (view, self._scene, self._people, work, first, last, colored, frame.rgb, frame.depth, frame.ids)
             for work, first, last in zip(self._workspaces, edges[:-1], edges[1:], strict=True)
         ]
         if self._pool is not None and self._warm:
@@ -125,4 +125,4 @@ class RasterRenderer:
         else:
             states = [draw(*job) for job in jobs]
         if min(states) < 0:
-            raise ValueError("a person has a vertex that is not finite; expected world coordinates in metres")
+            raise ValueError("a person has a vertex that is not finite; expected world coordinates in meters")

@@ -23,10 +23,10 @@ class ScenePack(NamedTuple):
     """A scene as arrays.
 
     Attributes:
-        boxes: (B, 8) float64, centre, half size (m), cosine and sine of the yaw; the floor is the first.
+        boxes: (B, 8) float64, center, half size (m), cosine and sine of the yaw; the floor is the first.
         cylinders: (C, 6) float64, x, y, lower and upper end, radius (m), and 1 if the ends are closed: the straight
             part of a capsule is open.
-        balls: (N, 6) float64, centre, radius and the lowest and highest z of the part that counts, m: a sphere, or
+        balls: (N, 6) float64, center, radius and the lowest and highest z of the part that counts, m: a sphere, or
             the upper or lower half of one.
         surfaces: (S, 17) float32, how each surface is shaded: normal (3) and its growth along x and y, plane offset,
             texture axes s (3 + 1) and t (3 + 1), albedo (3), the normal's growth along z; row 0 stands for nothing,
@@ -49,17 +49,17 @@ class ScenePack(NamedTuple):
 def pack_scene(scene: Scene) -> ScenePack:
     """Return the arrays of `scene`; a ValueError names a value that is not finite or a texture that does not exist."""
     x0, x1, y0, y1 = scene.bounds
-    centre, size = (0.5 * (x0 + x1), 0.5 * (y0 + y1), -0.5 * FLOOR_THICKNESS), (x1 - x0, y1 - y0, FLOOR_THICKNESS)
-    boxes = [Box(centre, size, scene.floor), *(p for p in scene.primitives if isinstance(p, Box))]
+    center, size = (0.5 * (x0 + x1), 0.5 * (y0 + y1), -0.5 * FLOOR_THICKNESS), (x1 - x0, y1 - y0, FLOOR_THICKNESS)
+    boxes = [Box(center, size, scene.floor), *(p for p in scene.primitives if isinstance(p, Box))]
     capsules = [p for p in scene.primitives if isinstance(p, Capsule)]
     cylinders = [
         *(p for p in scene.primitives if isinstance(p, Cylinder)),
-        *(Cylinder(p.centre, p.radius, p.straight, p.material) for p in capsules),
+        *(Cylinder(p.center, p.radius, p.straight, p.material) for p in capsules),
     ]
     closed = len(cylinders) - len(capsules)
     balls = [_ball(p, 0) for p in scene.primitives if isinstance(p, Sphere)]
     for capsule in capsules:
-        x, y, z = capsule.centre
+        x, y, z = capsule.center
         balls += [
             _ball(Sphere((x, y, z + half * 0.5 * capsule.straight), capsule.radius, capsule.material), half)
             for half in (-1, 1)
@@ -74,7 +74,7 @@ def pack_scene(scene: Scene) -> ScenePack:
         axes: tuple[tuple[float, float, float], tuple[float, float, float]],
         swell: float = 0.0,
     ) -> None:
-        surfaces.append([*normal, *_axis(axes[0], origin), *_axis(axes[1], origin), *material.colour, swell])
+        surfaces.append([*normal, *_axis(axes[0], origin), *_axis(axes[1], origin), *material.color, swell])
         textures.append(TEXTURES.index(choose("texture", material.texture, TEXTURES)))
 
     for box in boxes:
@@ -83,33 +83,33 @@ def pack_scene(scene: Scene) -> ScenePack:
         for face in range(FACES):
             axis, sign = face // 2, 2 * (face % 2) - 1
             normal = [sign * value for value in frame[axis]]
-            offset = sum(n * m for n, m in zip(normal, box.centre, strict=True)) + 0.5 * box.size[axis]
+            offset = sum(n * m for n, m in zip(normal, box.center, strict=True)) + 0.5 * box.size[axis]
             first, second = (k for k in range(3) if k != axis)
             if box.material.texture == "wood" and box.size[first] < box.size[second]:
                 first, second = second, first  # the grain runs along the longer side
-            add(box.material, box.centre, [*normal, 0.0, offset], (frame[first], frame[second]))
+            add(box.material, box.center, [*normal, 0.0, offset], (frame[first], frame[second]))
     around = (math.sqrt(0.5), math.sqrt(0.5), 0.0), (0.0, 0.0, 1.0)
     for cylinder in cylinders:
-        x, y, z = cylinder.centre
+        x, y, z = cylinder.center
         bend, half = 1.0 / cylinder.radius, 0.5 * cylinder.height
-        add(cylinder.material, cylinder.centre, [-x * bend, -y * bend, 0.0, bend, 0.0], around)
+        add(cylinder.material, cylinder.center, [-x * bend, -y * bend, 0.0, bend, 0.0], around)
         for up in (1.0, -1.0):
             flat = [0.0, 0.0, up, 0.0, up * z + half]
-            add(cylinder.material, cylinder.centre, flat, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+            add(cylinder.material, cylinder.center, flat, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
     for ball, _, _ in balls:
         bend = 1.0 / ball.radius
-        add(ball.material, ball.centre, [*(-v * bend for v in ball.centre), bend, 0.0], around, bend)
+        add(ball.material, ball.center, [*(-v * bend for v in ball.center), bend, 0.0], around, bend)
     pack = ScenePack(
-        _table([[*b.centre, *(0.5 * v for v in b.size), math.cos(b.yaw), math.sin(b.yaw)] for b in boxes], 8),
+        _table([[*b.center, *(0.5 * v for v in b.size), math.cos(b.yaw), math.sin(b.yaw)] for b in boxes], 8),
         _table(
             [
                 [x, y, z - c.height / 2, z + c.height / 2, c.radius, k < closed]
                 for k, c in enumerate(cylinders)
-                for x, y, z in [c.centre]
+                for x, y, z in [c.center]
             ],
             6,
         ),
-        _table([[*b.centre, b.radius, low, high] for b, low, high in balls], 6),
+        _table([[*b.center, b.radius, low, high] for b, low, high in balls], 6),
         _table(surfaces, 17).astype(np.float32),
         np.array(textures, np.uint8),
         _table([_lamp(m) for m in scene.lights], 4).astype(np.float32),
@@ -117,7 +117,7 @@ def pack_scene(scene: Scene) -> ScenePack:
     )
     for name, array in pack._asdict().items():
         if not np.isfinite(array).all():
-            raise ValueError(f"the scene {scene.name!r} has {name} that are not finite; expected finite metres")
+            raise ValueError(f"the scene {scene.name!r} has {name} that are not finite; expected finite meters")
     return pack
 
 
@@ -126,7 +126,7 @@ def _ball(sphere: Sphere, half: int) -> tuple[Sphere, float, float]:
 
     A half reaches a hair too far, where it lies less than 1e-8 radii inside a capsule's straight part: no crack.
     """
-    z, radius = sphere.centre[2], sphere.radius
+    z, radius = sphere.center[2], sphere.radius
     return sphere, z - (SEAM if half > 0 else 2.0) * radius, z + (SEAM if half < 0 else 2.0) * radius
 
 

@@ -4,7 +4,7 @@
 Camera frame: X right, Y down, Z forward along the optical axis; the camera is level. A pixel looks along the ray
 (X, Y, 1), and a plane n . P = d is seen at 1/Z = (nx X + ny Y + nz) / d: affine in the picture, exact everywhere.
 An edge from P to Q splits the picture by the sign of (P x Q) . (X, Y, 1), also when an end lies behind the camera, so
-nothing has to be cut at the near plane. Neighbours see the same edge with exactly opposite signs: no cracks.
+nothing has to be cut at the near plane. Neighbors see the same edge with exactly opposite signs: no cracks.
 """
 
 import math
@@ -179,7 +179,7 @@ def find_cylinders(view, cylinders, work):
 def find_balls(view, balls, work):
     """Fill `work.balls` with the balls that may be seen; return how many.
 
-    A record is (X, Y, Z of the centre, its squared distance less the squared radius, least and greatest Y of the part
+    A record is (X, Y, Z of the center, its squared distance less the squared radius, least and greatest Y of the part
     that counts, greatest 1/Z).
     """
     ex, ey, ez, c, s, near = view.x, view.y, view.z, view.cosine, view.sine, view.near

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Kernels that colour a tile once it is known what every pixel sees."""
+"""Kernels that color a tile once it is known what every pixel sees."""
 
 import math
 
@@ -26,7 +26,7 @@ from follow_env.camera.raster.fill import (
 from follow_env.camera.raster.textures import paint
 
 BACKGROUND = np.uint32(178 + 256 * 178 + 65536 * 204)
-"""Colour of a pixel that sees nothing, as TinyRenderer's: red + 256 green + 65536 blue."""
+"""Color of a pixel that sees nothing, as TinyRenderer's: red + 256 green + 65536 blue."""
 SOFT = np.float32(1.0)
 """Added to the squared distance to a lamp, m^2: a lamp is no point."""
 BOUNCE, DIRECT = np.float32(0.25), np.float32(0.75)
@@ -53,8 +53,8 @@ def lamp_light(dx, dy, dz, nx, ny, nz, strength):
 
 
 @_jit
-def shade_surface(number, first, last, view, surfaces, texture, lamps, ambient, lanes, seen, colours):
-    """Colour the pixels `first` <= k < `last` (uint64, whole rows) that see surface `number` of the scene.
+def shade_surface(number, first, last, view, surfaces, texture, lamps, ambient, lanes, seen, colors):
+    """Color the pixels `first` <= k < `last` (uint64, whole rows) that see surface `number` of the scene.
 
     All pixels of the range are shaded as if they saw it, and those that do are kept.
     """
@@ -103,13 +103,13 @@ def shade_surface(number, first, last, view, surfaces, texture, lamps, ambient, 
     red, green, blue = _FULL * surfaces[number, 13], _FULL * surfaces[number, 14], _FULL * surfaces[number, 15]
     for k in range(first, last):
         light = lanes[LIGHT + k]
-        colour = _colour(red * light, green * light, blue * light)
-        colours[k] = colour if seen[k] == number else colours[k]
+        color = _color(red * light, green * light, blue * light)
+        colors[k] = color if seen[k] == number else colors[k]
 
 
 @_jit
-def shade_triangles(height, width, static, places, pattern, albedo, triangles, lanes, seen, colours):
-    """Colour the pixels of the first `height` rows and `width` columns that see a triangle: number `static` and above.
+def shade_triangles(height, width, static, places, pattern, albedo, triangles, lanes, seen, colors):
+    """Color the pixels of the first `height` rows and `width` columns that see a triangle: number `static` and above.
 
     One loop in one call: numba counts references to the arrays of a call by atomic operations.
     """
@@ -133,11 +133,11 @@ def shade_triangles(height, width, static, places, pattern, albedo, triangles, l
                     odd = np.int32(np.int32(ax * _CHECK + _SHIFT) + np.int32(ay * _CHECK + _SHIFT))
                     odd = np.int32(odd + np.int32(az * _CHECK + _SHIFT))
             light = light * _DARK if odd & np.int32(1) else light
-            colours[k] = _colour(albedo[f, 0] * light, albedo[f, 1] * light, albedo[f, 2] * light)
+            colors[k] = _color(albedo[f, 0] * light, albedo[f, 1] * light, albedo[f, 2] * light)
 
 
 @_jit
-def _colour(red, green, blue):
+def _color(red, green, blue):
     """Pack three numbers >= 0, cut at 255 and rounded, as red + 256 green + 65536 blue."""
     r = np.int32(min(red, _FULL) + _ROUND)
     g = np.int32(min(green, _FULL) + _ROUND)

@@ -16,7 +16,7 @@ TEXTURES = ("plain", "tiles", "wood", "brick", "carpet", "spines")
 _ONE, _HALF = np.float32(1.0), np.float32(0.5)
 _SHIFT = np.float32(4096.0)
 _BYTE = np.float32(1.0 / 255.0)
-# Cells per metre, joints as a share of a cell, brightness of joints, and how far the brightness of cells varies.
+# Cells per meter, joints as a share of a cell, brightness of joints, and how far the brightness of cells varies.
 _TILE, _GROUT, _GROUT_SHADE, _TILE_VARIETY = np.float32(1 / 0.45), np.float32(0.02), np.float32(0.72), np.float32(0.14)
 _GRAIN, _GRAIN_VARIETY = np.float32(1 / 0.012), np.float32(0.26)
 _BOARD, _WARP = np.float32(1 / 0.9), np.float32(3.0)
@@ -36,7 +36,7 @@ def paint(texture, first, last, lanes):
         texture: index into `TEXTURES`, not 0.
         first: first pixel.
         last: the pixel after the last.
-        lanes: the tile; its planes `S` and `T` are the surface coordinates, m, `SHARP` the pixels per metre there.
+        lanes: the tile; its planes `S` and `T` are the surface coordinates, m, `SHARP` the pixels per meter there.
     """
     if texture == 1:
         _tiles(first, last, lanes)

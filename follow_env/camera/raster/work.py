@@ -47,7 +47,7 @@ class PeoplePack(NamedTuple):
     vertices: np.ndarray
     normals: np.ndarray
     faces: np.ndarray
-    colours: np.ndarray
+    colors: np.ndarray
     pattern: np.ndarray
     borders: np.ndarray
     anchors: np.ndarray
@@ -60,7 +60,7 @@ class Workspace(NamedTuple):
 
     lanes: np.ndarray
     seen: np.ndarray
-    colours: np.ndarray
+    colors: np.ndarray
     corners: np.ndarray
     quad: np.ndarray
     bounds: np.ndarray
@@ -88,7 +88,7 @@ def make_view(camera: PinholeCamera, pose: CameraPose, scale: int) -> View:
         ValueError: if the pose is not finite.
     """
     if not all(map(math.isfinite, (pose.x, pose.y, pose.z, pose.yaw))):
-        raise ValueError(f"the camera's pose is {pose!r}; expected finite numbers in metres and radians")
+        raise ValueError(f"the camera's pose is {pose!r}; expected finite numbers in meters and radians")
     width, height, step = scale * camera.width, scale * camera.height, 1.0 / (scale * camera.focal)
     return View(
         float(pose.x),
@@ -123,7 +123,7 @@ def pack_people(people: Sequence[tuple[Mesh, int]]) -> PeoplePack:
         np.concatenate(
             [np.zeros((0, 3), np.int32), *(m.faces + np.int32(s[0]) for m, s in zip(meshes, starts, strict=False))]
         ),
-        np.concatenate([none, *(m.colours for m in meshes)]),
+        np.concatenate([none, *(m.colors for m in meshes)]),
         np.concatenate([np.zeros(0, np.uint8), *(m.pattern for m in meshes)]),
         np.concatenate([np.zeros(0, np.bool_), *(m.near_border for m in meshes)]),
         np.concatenate([none, *(m.anchors for m in meshes)]),

@@ -11,7 +11,7 @@ from follow_env.camera.pinhole import PinholeCamera
 from follow_env.camera.sensor.kernels import (
     NORMAL_BITS,
     SHIFT_BITS,
-    ColourModel,
+    ColorModel,
     DepthModel,
     SensorModel,
     corrupt,
@@ -19,7 +19,7 @@ from follow_env.camera.sensor.kernels import (
     pack_bytes,
 )
 from follow_env.compilation import announced
-from follow_env.config import ColourConfig, DepthConfig
+from follow_env.config import ColorConfig, DepthConfig
 
 NATIVE_WIDTH = 640
 """Width of the sensor's own picture, px: dials in pixels refer to it unless they say otherwise."""
@@ -39,18 +39,18 @@ class RGBDSensor:
        surface from the projector, `dark_dropout` max(0, 1 - L / dark_level) at luminance L (Rec. 601), and
        `grazing_dropout` max(0, 1 - cos(angle) / cos(grazing_deg)) at this angle between ray and normal.
 
-    **Colour** is blurred, multiplied by the exposure's gain, given noise of sigma^2 = read^2 + shot^2 I (I the grey
+    **Color** is blurred, multiplied by the exposure's gain, given noise of sigma^2 = read^2 + shot^2 I (I the gray
     level), cut at 0 and 255 and rounded.
 
-    What is lost is lost pixel by pixel; the blotches of real sensors are not modelled.
+    What is lost is lost pixel by pixel; the blotches of real sensors are not modeled.
 
     Args:
         depth: the dials.
-        colour: the dials.
+        color: the dials.
         camera: the intrinsics; depth beyond its `far` is nothing seen.
     """
 
-    def __init__(self, depth: DepthConfig, colour: ColourConfig, camera: PinholeCamera) -> None:
+    def __init__(self, depth: DepthConfig, color: ColorConfig, camera: PinholeCamera) -> None:
         height, width, scale = camera.height, camera.width, camera.width / NATIVE_WIDTH
         focal_baseline, step, far = camera.focal * depth.baseline, depth.disparity_step * scale, camera.config.far
         real = np.float32
@@ -74,11 +74,11 @@ class RGBDSensor:
             band=depth.edge_band,
         )
         sigma = depth.lateral_noise * scale
-        taps = _gaussian_taps(colour.blur * scale)
-        exact = taps.size == 1 and colour.gain == 1.0 and not (colour.read_noise or colour.shot_noise)
+        taps = _gaussian_taps(color.blur * scale)
+        exact = taps.size == 1 and color.gain == 1.0 and not (color.read_noise or color.shot_noise)
         self.model = SensorModel(
             dials,
-            ColourModel(real(colour.gain), real(colour.read_noise), real(colour.shot_noise), taps, exact),
+            ColorModel(real(color.gain), real(color.read_noise), real(color.shot_noise), taps, exact),
             _quantiles(NORMAL_BITS).astype(np.float32),
             np.rint(sigma * _quantiles(SHIFT_BITS)).astype(np.int32),
         )
@@ -88,19 +88,19 @@ class RGBDSensor:
     def corrupt(self, frame: RGBDFrame, seed: int) -> RGBDFrame:
         """Return `frame` with the errors that `seed` (0 <= seed < 2^64) stands for; the ids stay exact.
 
-        Depth not above 0 or not finite is no reading, 0. With colour errors off the colours are those of `frame`, not
+        Depth not above 0 or not finite is no reading, 0. With color errors off the colors are those of `frame`, not
         copied.
         """
-        true, colours = np.ascontiguousarray(frame.depth), np.ascontiguousarray(frame.rgb)
-        depth, rgb = np.empty_like(true), colours if self.model.colour.exact else np.empty_like(colours)
+        true, colors = np.ascontiguousarray(frame.depth), np.ascontiguousarray(frame.rgb)
+        depth, rgb = np.empty_like(true), colors if self.model.color.exact else np.empty_like(colors)
         with nullcontext() if self._warm else announced("the camera"):
-            corrupt(true, colours, np.uint64(seed), self.model, self.work, depth, rgb)
+            corrupt(true, colors, np.uint64(seed), self.model, self.work, depth, rgb)
         self._warm = True
         return RGBDFrame(rgb, depth, frame.ids)
 
 
 def packed(rgb: np.ndarray, depth: np.ndarray) -> np.ndarray:
-    """Return colours (..., H, W, 3) and depths (..., H, W) as one (..., H, W, 4) uint8.
+    """Return colors (..., H, W, 3) and depths (..., H, W) as one (..., H, W, 4) uint8.
 
     The fourth is nearness: 255 (1 - z / 8 m), 0 = no reading or beyond.
     """

@@ -16,14 +16,14 @@ NORMAL_BITS, SHIFT_BITS = 12, 10
 """Axial noise takes one of 2^12 equally likely normal quantiles, the lateral jitter of each axis one of 2^10."""
 LANES = 16
 """Numbers in the widest vectors of processors."""
-_PLACE, _FATE, _COLOUR = (np.uint32(n) for n in (0x00000000, 0x6C8E9CF5, 0xD192ED03))
+_PLACE, _FATE, _COLOR = (np.uint32(n) for n in (0x00000000, 0x6C8E9CF5, 0xD192ED03))
 _ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
 _FINE, _BLIND = np.float32(256.0), np.float32(1e6)
 _MOST = np.float32(1e9)
 _TINY = np.float32(1e-30)
 _NEAREST = np.float32(0.01)
 _SHARE = np.float32(2.0**-16)
-_CONSTANT, _SQUARE, _CENTRE = np.float32(0.0012), np.float32(0.0019), np.float32(0.4)
+_CONSTANT, _SQUARE, _CENTER = np.float32(0.0012), np.float32(0.0019), np.float32(0.4)
 _RED, _GREEN, _BLUE, _PER_MILLE = np.int32(299), np.int32(587), np.int32(114), np.float32(0.001)
 _FULL = np.float32(255.0)
 _BYTES_MEAN = np.float32(510.0)
@@ -56,8 +56,8 @@ class DepthModel(NamedTuple):
     band: int
 
 
-class ColourModel(NamedTuple):
-    """`ColourConfig`: exposure, noise in grey levels, the blur's weights (r + 1,) from the middle outwards.
+class ColorModel(NamedTuple):
+    """`ColorConfig`: exposure, noise in gray levels, the blur's weights (r + 1,) from the middle outwards.
 
     `exact` says that there are no errors.
     """
@@ -73,7 +73,7 @@ class SensorModel(NamedTuple):
     """A sensor: its dials, 2^NORMAL_BITS float32 normal quantiles and 2^SHIFT_BITS int32 displacements in px."""
 
     depth: DepthModel
-    colour: ColourModel
+    color: ColorModel
     normal: np.ndarray
     shift: np.ndarray
 
@@ -82,7 +82,7 @@ class SensorWork(NamedTuple):
     """Buffers for pictures H x W, with P = `padded(W)` and the blur's radius r.
 
     Inverse depth (H, P), chance of no reading (P,), five rows (5, P + 2 pad), bits (2, P), places seen (P,); a row of
-    colours before and after the blur across (2, Q + 6 r), its bits and its levels (Q,), Q = `padded(3 W)`.
+    colors before and after the blur across (2, Q + 6 r), its bits and its levels (Q,), Q = `padded(3 W)`.
     """
 
     inverse: np.ndarray
@@ -90,8 +90,8 @@ class SensorWork(NamedTuple):
     rows: np.ndarray
     bits: np.ndarray
     places: np.ndarray
-    colour_rows: np.ndarray
-    colour_bits: np.ndarray
+    color_rows: np.ndarray
+    color_bits: np.ndarray
     levels: np.ndarray
 
 
@@ -104,7 +104,7 @@ def make_work(height: int, width: int, model: SensorModel) -> SensorWork:
         np.zeros((5, one + 2 * max(model.depth.band, 1)), np.float32),
         np.zeros((2, one), np.uint32),
         np.zeros(one, np.int32),
-        np.zeros((2, three + 6 * (model.colour.taps.size - 1)), np.float32),
+        np.zeros((2, three + 6 * (model.color.taps.size - 1)), np.float32),
         np.zeros(three, np.uint32),
         np.zeros(three, np.int32),
     )
@@ -126,11 +126,11 @@ def corrupt(depth, rgb, seed, model, work, depth_out, rgb_out):
         model: `SensorModel`.
         work: `SensorWork`.
         depth_out: (H, W) float32, out.
-        rgb_out: (H, W, 3) uint8, out; not written if the colours are exact.
+        rgb_out: (H, W, 3) uint8, out; not written if the colors are exact.
     """
     _corrupt_depth(depth, rgb, seed, model.depth, model.normal, model.shift, work, depth_out)
-    if not model.colour.exact:
-        _corrupt_colour(rgb, seed, model.colour, work, rgb_out)
+    if not model.color.exact:
+        _corrupt_color(rgb, seed, model.color, work, rgb_out)
 
 
 @_inline
@@ -273,7 +273,7 @@ def _read_row(i, depth, inverse, model, normal, shift, lost, rows, bits, out):
     for j in range(columns):
         true = rows[4, j]
         chance = np.float32(np.int32(bits[1, j] >> np.uint32(16))) * _SHARE
-        spread = true - _CENTRE
+        spread = true - _CENTER
         z = true + model.axial * (_CONSTANT + _SQUARE * (spread * spread)) * rows[3, j]
         disparity = np.int32(min(model.unit / max(z, _NEAREST), _MOST) + _HALF)
         level = model.unit / max(np.float32(disparity), _ONE)
@@ -289,15 +289,15 @@ def _read_row(i, depth, inverse, model, normal, shift, lost, rows, bits, out):
 
 
 @_inline
-def _corrupt_colour(rgb, seed, model, work, out):
+def _corrupt_color(rgb, seed, model, work, out):
     """Write the blurred, exposed and noisy picture."""
     height, three, one = np.uint64(rgb.shape[0]), np.uint64(3), np.uint64(1)
     source, target = rgb.reshape(rgb.shape[0], -1), out.reshape(rgb.shape[0], -1)
-    taps, bits, levels = model.taps, work.colour_bits, work.levels
-    line, smooth = work.colour_rows[0], work.colour_rows[1]
+    taps, bits, levels = model.taps, work.color_bits, work.levels
+    line, smooth = work.color_rows[0], work.color_rows[1]
     count, columns, pad = np.uint64(source.shape[1]), np.uint64(bits.size), np.uint64(3 * (taps.size - 1))
     gain, read, shot = model.gain, model.read_noise * model.read_noise, model.shot_noise * model.shot_noise
-    _seed(seed, _COLOUR, bits)
+    _seed(seed, _COLOR, bits)
     for i in range(height):
         for k in range(count):
             line[pad + k] = gain * taps[0] * np.float32(source[i, k])
@@ -326,7 +326,7 @@ def _corrupt_colour(rgb, seed, model, work, out):
 
 @_jit
 def pack_bytes(rgb, depth, out):
-    """Write colour and nearness 255 (1 - z / 8 m), 0 = no reading or beyond, to `out` (H, W, 4) uint8."""
+    """Write color and nearness 255 (1 - z / 8 m), 0 = no reading or beyond, to `out` (H, W, 4) uint8."""
     for i in range(np.uint64(depth.shape[0])):
         for j in range(np.uint64(depth.shape[1])):
             z = depth[i, j]

@@ -25,7 +25,7 @@ class RGBDSensing:
     def __init__(self, config: SensorConfig, camera: PinholeCamera, dt: float, boxes: bool) -> None:
         self.config = config
         self._camera, self._dt, self._boxes = camera, dt, boxes
-        self._sensor = RGBDSensor(config.depth, config.colour, camera)
+        self._sensor = RGBDSensor(config.depth, config.color, camera)
         self.restart()
 
     def restart(self) -> None:
@@ -64,8 +64,8 @@ def _jittered(
 ) -> np.ndarray:
     u0, v0, u1, v1 = tight
     width, height = u1 - u0, v1 - v0
-    u = 0.5 * (u0 + u1) + config.centre_jitter * errors[0] * width
-    v = 0.5 * (v0 + v1) + config.centre_jitter * errors[1] * height
+    u = 0.5 * (u0 + u1) + config.center_jitter * errors[0] * width
+    v = 0.5 * (v0 + v1) + config.center_jitter * errors[1] * height
     half_w = 0.5 * width * max(1.0 + config.size_jitter * errors[2], 0.2)
     half_h = 0.5 * height * max(1.0 + config.size_jitter * errors[3], 0.2)
     limit_u, limit_v = float(camera.width), float(camera.height)

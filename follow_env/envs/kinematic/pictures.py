@@ -51,7 +51,7 @@ class Pictures:
         return [partial(paint, *ends, *given, studio, *latest) for ends, studio in parts]
 
     def observed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return fresh colours (n, H, W, 3 or, with nearness, 4) uint8 and depths (n, H, W) float32 m, seen now."""
+        """Return fresh colors (n, H, W, 3 or, with nearness, 4) uint8 and depths (n, H, W) float32 m, seen now."""
         return self._observed
 
     def _blank(self) -> tuple[np.ndarray, np.ndarray]:
@@ -73,7 +73,7 @@ def _studio(single: "FollowEnv") -> Studio:
     """Return what a thread needs to draw the worlds of `single`."""
     camera, robot, body = single.camera, single.robot_config, load_body(*single._dressed)
     eye, scene = CameraPose(0.0, 0.0, robot.camera_height, 0.0), pack_scene(single.scene)
-    sensor = RGBDSensor(single._sensor.depth, single._sensor.colour, camera)
+    sensor = RGBDSensor(single._sensor.depth, single._sensor.color, camera)
     times = 2 if camera.config.supersample == 2 else 0
     return Studio(
         make_view(camera, eye, 1),

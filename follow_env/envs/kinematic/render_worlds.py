@@ -67,7 +67,7 @@ class Studio(NamedTuple):
 
 def _compiled(sources: int) -> Callable[..., bool]:
     @njit(cache=True, nogil=True, error_model="numpy")
-    def paint(first, last, todo, worlds, studio, rgb, depth, colours, distances):
+    def paint(first, last, todo, worlds, studio, rgb, depth, colors, distances):
         """Draw the worlds first <= i < last that begin or step; hand over what all of them observe.
 
         Args:
@@ -78,7 +78,7 @@ def _compiled(sources: int) -> Callable[..., bool]:
             studio: `Studio`.
             rgb: (slots, n, H, W, 3) uint8, the latest pictures; all slots are filled when a world begins.
             depth: (slots, n, H, W) float32, m.
-            colours: (n, H, W, 3) uint8, out, or (n, H, W, 4) with nearness: see `pack_bytes`.
+            colors: (n, H, W, 3) uint8, out, or (n, H, W, 4) with nearness: see `pack_bytes`.
             distances: (n, H, W) float32, out, m.
 
         Returns:
@@ -93,7 +93,7 @@ def _compiled(sources: int) -> Callable[..., bool]:
                 if not _draw(world, studio):
                     return False
                 canvas = studio.canvas
-                if studio.sensor.colour.exact:
+                if studio.sensor.color.exact:
                     rgb[latest, i] = canvas.rgb
                 given = studio.sensor, studio.sensor_work, depth[latest, i], rgb[latest, i]
                 corrupt(canvas.depth, canvas.rgb, world.picture_seed, *given)
@@ -102,10 +102,10 @@ def _compiled(sources: int) -> Callable[..., bool]:
                     if slot != latest:
                         rgb[slot, i], depth[slot, i] = rgb[latest, i], depth[latest, i]
             distances[i] = depth[oldest, i]
-            if colours.shape[3] == 4:
-                pack_bytes(rgb[oldest, i], depth[oldest, i], colours[i])
+            if colors.shape[3] == 4:
+                pack_bytes(rgb[oldest, i], depth[oldest, i], colors[i])
             else:
-                colours[i] = rgb[oldest, i]
+                colors[i] = rgb[oldest, i]
         return True
 
     return paint
@@ -130,9 +130,9 @@ def _draw(world, studio):
 
 
 @njit(nogil=True, error_model="numpy")
-def _render(view, studio, coloured, canvas):
+def _render(view, studio, colored, canvas):
     out = canvas.rgb, canvas.depth, canvas.ids
-    return draw(view, studio.scene, studio.people, studio.work, 0, view.rows, coloured, *out) == 0
+    return draw(view, studio.scene, studio.people, studio.work, 0, view.rows, colored, *out) == 0
 
 
 @njit(nogil=True, error_model="numpy")

@@ -1,8 +1,8 @@
 # mypy: disable-error-code="no-untyped-def"
 """The place seen from above: how far the next obstacle is, what the robot touches, what hides the person.
 
-A grid holds the distance from each cell's centre to the next obstacle. The distance at a point differs from it by the
-way to the centre at most, which settles nearly every question; the rest is computed exactly.
+A grid holds the distance from each cell's center to the next obstacle. The distance at a point differs from it by the
+way to the center at most, which settles nearly every question; the rest is computed exactly.
 """
 
 import math
@@ -23,7 +23,7 @@ CHASSIS_LOW, CHASSIS_HIGH = 0.05, 0.15
 CASTER_MIDDLE, CASTER_RADIUS = -0.18, 0.03
 MAST_MIDDLE, MAST_RADIUS, MAST_LOW, MAST_HIGH = -0.07, 0.03, 0.16, 0.96
 PERSON_LOW = 0.5 * PERSON_HEIGHT - 0.5 * (PERSON_HEIGHT - 2.0 * PERSON_RADIUS - 0.02)
-"""Height of the centre of the lower half-sphere of the person's capsule, m."""
+"""Height of the center of the lower half-sphere of the person's capsule, m."""
 FURTHEST = 0.24
 """All parts but the wheels lie in a circle of this radius around the axle's middle, m."""
 
@@ -35,7 +35,7 @@ OBSTACLE = np.dtype(
 
 
 class Place(NamedTuple):
-    """Obstacles of a scene, and grids (columns, rows) of the distance from cell centres to the next of them.
+    """Obstacles of a scene, and grids (columns, rows) of the distance from cell centers to the next of them.
 
     `sight` are the obstacles between the camera's height and that of the person's chest.
     """
@@ -57,7 +57,7 @@ def pack_place(scene: Scene, camera_height: float, chest_height: float) -> Place
         else:
             length, width, radius, yaw = 0.0, 0.0, p.radius, 0.0
         reach = math.sqrt(length * length + width * width) + radius
-        x, y, z = p.centre
+        x, y, z = p.center
         footprint = (x, y, length, width, math.cos(yaw), math.sin(yaw), radius)
         rows.append((*footprint, p.bottom, 2.0 * z - p.bottom, reach))
     obstacles = np.array(rows, OBSTACLE)

@@ -1,6 +1,6 @@
 """Bodies that are seen: skinned, clothed people, read from `assets/`, and what they wear.
 
-LICENCES.md beside the assets says where they come from.
+LICENSES.md beside the assets says where they come from.
 
 Rest frame: origin on the floor below the pelvis, x forward, y left, z up, m.
 """
@@ -22,27 +22,27 @@ DETAILS = ("low", "high")
 MATERIALS = ("skin", "hair", "shirt", "trousers", "shoes", "eyes")
 PATTERNS = ("plain", "stripes", "checks")
 
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Outfit:
-    """Colours of a person, sRGB in [0, 1], and the pattern of the shirt (one of `PATTERNS`)."""
+    """Colors of a person, sRGB in [0, 1], and the pattern of the shirt (one of `PATTERNS`)."""
 
-    skin: Colour = (0.80, 0.60, 0.48)
-    hair: Colour = (0.17, 0.11, 0.07)
-    shirt: Colour = (0.16, 0.30, 0.62)
-    trousers: Colour = (0.20, 0.20, 0.24)
-    shoes: Colour = (0.10, 0.10, 0.11)
-    eyes: Colour = (0.10, 0.07, 0.05)
+    skin: Color = (0.80, 0.60, 0.48)
+    hair: Color = (0.17, 0.11, 0.07)
+    shirt: Color = (0.16, 0.30, 0.62)
+    trousers: Color = (0.20, 0.20, 0.24)
+    shoes: Color = (0.10, 0.10, 0.11)
+    eyes: Color = (0.10, 0.07, 0.05)
     pattern: str = "plain"
 
     def __post_init__(self) -> None:
         choose("pattern", self.pattern, PATTERNS)
         for name in MATERIALS:
-            colour = getattr(self, name)
-            if len(colour) != 3 or not all(0.0 <= value <= 1.0 for value in colour):
-                raise ValueError(f"{name} is {colour}; expected three sRGB values in [0, 1]")
+            color = getattr(self, name)
+            if len(color) != 3 or not all(0.0 <= value <= 1.0 for value in color):
+                raise ValueError(f"{name} is {color}; expected three sRGB values in [0, 1]")
 
 
 OUTFITS: dict[str, Outfit] = {
@@ -55,18 +55,18 @@ OUTFITS: dict[str, Outfit] = {
         (0.88, 0.70, 0.60), (0.62, 0.46, 0.24), (0.80, 0.80, 0.84), (0.13, 0.13, 0.15), pattern="stripes"
     ),
     "checks": Outfit((0.82, 0.63, 0.52), (0.50, 0.48, 0.46), (0.55, 0.20, 0.22), (0.30, 0.25, 0.18), pattern="checks"),
-    "grey": Outfit((0.50, 0.33, 0.23), (0.10, 0.07, 0.05), (0.45, 0.47, 0.50), (0.30, 0.31, 0.34)),
+    "gray": Outfit((0.50, 0.33, 0.23), (0.10, 0.07, 0.05), (0.45, 0.47, 0.50), (0.30, 0.31, 0.34)),
 }
 """Outfits by name."""
 SUITS: dict[str, Outfit] = {
-    name: Outfit(shirt=colour, trousers=colour)
-    for name, colour in {
+    name: Outfit(shirt=color, trousers=color)
+    for name, color in {
         "green": (0.16, 0.48, 0.28),
         "blue": (0.13, 0.33, 0.70),
         "indigo": (0.18, 0.16, 0.42),
     }.items()
 }
-"""Paper A's three spacesuits: shirt and trousers of one colour."""
+"""Paper A's three spacesuits: shirt and trousers of one color."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Body:
     Attributes:
         name: one of `BODIES`.
         height: standing height with shoes and hair, m.
-        mesh: faces, colours and rest vertices.
+        mesh: faces, colors and rest vertices.
         bones: (V, 4) int32, the bones that move a vertex.
         weights: (V, 4) float32, their shares, sum 1.
         joints: (J, 3) float64, rest position of each bone's head.
@@ -99,7 +99,7 @@ def load_body(name: str = "man", outfit: str | Outfit = "blue", detail: str = "l
 
     Args:
         name: one of `BODIES`.
-        outfit: a key of `OUTFITS`, or colours.
+        outfit: a key of `OUTFITS`, or colors.
         detail: one of `DETAILS`.
 
     Raises:
@@ -116,7 +116,7 @@ def load_body(name: str = "man", outfit: str | Outfit = "blue", detail: str = "l
     palette = np.array([getattr(outfit, material) for material in MATERIALS], np.float32)
     mesh = Mesh(
         faces=_frozen(arrays[f"{detail}_faces"].astype(np.int32)),
-        colours=_frozen(palette[materials]),
+        colors=_frozen(palette[materials]),
         pattern=_frozen(
             np.where(materials == MATERIALS.index("shirt"), PATTERNS.index(outfit.pattern), 0).astype(np.uint8)
         ),

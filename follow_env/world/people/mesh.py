@@ -17,20 +17,20 @@ class Mesh:
 
     Attributes:
         faces: (F, 3) int32, vertex indices, counter-clockwise seen from outside.
-        colours: (F, 3) float32, sRGB albedo in [0, 1] of each face.
+        colors: (F, 3) float32, sRGB albedo in [0, 1] of each face.
         pattern: (F,) uint8, 0 = plain, 1 = stripes, 2 = checks, drawn in the coordinates `anchors`.
         anchors: (V, 3) float32, vertices of the body at rest, m.
     """
 
     faces: np.ndarray
-    colours: np.ndarray
+    colors: np.ndarray
     pattern: np.ndarray
     anchors: np.ndarray
 
     def __post_init__(self) -> None:
         faces, vertices = len(self.faces), len(self.anchors)
         _check("faces", self.faces, np.int32, (faces, 3))
-        _check("colours", self.colours, np.float32, (faces, 3))
+        _check("colors", self.colors, np.float32, (faces, 3))
         _check("pattern", self.pattern, np.uint8, (faces,))
         _check("anchors", self.anchors, np.float32, (vertices, 3))
         if faces and not 0 <= self.faces.min() <= self.faces.max() < vertices:

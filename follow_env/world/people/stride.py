@@ -33,7 +33,7 @@ SWING_WIDTH = 0.3
 """Share of the clips' outward arc of the foot in swing."""
 SWING_LIFT = 0.05
 """Greatest height of the swinging sole's lowest point, somewhat past mid-swing, leg lengths."""
-STANCE_CENTRE = -0.08
+STANCE_CENTER = -0.08
 """Of the ankle relative to the pelvis in mid-stance, leg lengths."""
 ARM_JOG = 1.5
 """How much sooner than the rest the arms take the run clip's bent elbows."""
@@ -104,7 +104,7 @@ def _stance(
 ) -> tuple[float, float, float]:
     """Return ankle x, ankle z and foot pitch of a foot on the floor; `foot` holds heel and toe joint, see `Legs`."""
     flat_until = FLAT_UNTIL * duty / WALK_DUTY
-    x = STANCE_CENTRE * leg - stride * (phase - 0.5 * duty)
+    x = STANCE_CENTER * leg - stride * (phase - 0.5 * duty)
     heel_x, toe_x, toe_z, ankle_z = foot[0], foot[1], foot[2], foot[3]
     if phase < FLAT_FROM:
         share = 1.0 - phase / FLAT_FROM

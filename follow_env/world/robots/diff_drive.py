@@ -1,4 +1,4 @@
-"""`DiffDrive`: body twist <-> wheel speeds, limits and the modelled response of the wheels.
+"""`DiffDrive`: body twist <-> wheel speeds, limits and the modeled response of the wheels.
 
 Robot frame: x forward, y left, origin at the middle of the axle (REP-103).
 """

@@ -8,7 +8,7 @@ from gymnasium.vector import AutoresetMode
 import follow_env
 from baselines.followers.calibration import NoiseModel
 from baselines.learned.adapter import FollowVecEnv
-from tracker.estimators.batch import BatchFilter
+from tracker.estimators.akf_batch import BatchFilter
 
 CORRIDOR, INDOOR = follow_env.IDS["corridor"], follow_env.IDS["indoor"]
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from baselines.benchmark.build import cell_of, driver
-from baselines.cli.main import main as cli
+from baselines.cli import main as cli
 
 
 @pytest.fixture(autouse=True)

@@ -65,7 +65,7 @@ def test_pairs_are_close_and_hide_each_other_by_every_degree() -> None:
         if len(people) == 2:
             first, second = people
             gaps.append(math.dist(first.pose[:2], second.pose[:2]))
-            alike += np.array_equal(first.mesh.colours, second.mesh.colours)
+            alike += np.array_equal(first.mesh.colors, second.mesh.colors)
         if len(boxes) == 2:
             overlaps.append(iou(boxes[:1], boxes[1:]).item())
     assert len(gaps) > 40
@@ -115,9 +115,9 @@ def test_an_inclined_picture_shows_what_a_turned_camera_would() -> None:
     direct = source._warp(turned.ids, crop, cv2.INTER_NEAREST, cv2.BORDER_CONSTANT)
     assert (direct > 0).sum() > 500
     assert (warped != direct).mean() < 0.01
-    grey = np.full((300, 300, 3), 128, np.uint8)
-    depth = source._sensed(straight.depth, grey, turn @ crop, rng)
-    same = source._sensed(turned.depth, grey, crop, rng)
+    gray = np.full((300, 300, 3), 128, np.uint8)
+    depth = source._sensed(straight.depth, gray, turn @ crop, rng)
+    same = source._sensed(turned.depth, gray, crop, rng)
     both = (depth > 0) & (same > 0) & (np.abs(depth - same) < 0.3)
     assert both.mean() > 0.5
     assert np.abs(np.median((depth - same)[both])) < 0.01

@@ -71,7 +71,7 @@ def test_boxes_beside_the_picture_are_nobody() -> None:
         assert read(logits, offsets, PRIORS, (300, 300), 0.5) == []
 
 
-def test_the_input_is_squashed_and_depth_becomes_a_fourth_colour() -> None:
+def test_the_input_is_squashed_and_depth_becomes_a_fourth_color() -> None:
     depth = np.full((240, 320), 4.0, np.float32)
     depth[:, :160] = 0.0
     squashed = network_input(PICTURE, depth)

@@ -73,15 +73,15 @@ def test_a_network_learns_eight_pictures(name: str, steps: int, rate: float, sha
     matched = [match(s.boxes, s.difficult, priors) for s in samples]
     targets = [torch.from_numpy(np.stack(part)) for part in zip(*matched, strict=True)]
     network = make_network(name).train()
-    optimiser = torch.optim.AdamW(network.parameters(), lr=rate)
+    optimizer = torch.optim.AdamW(network.parameters(), lr=rate)
     losses = []
     for _ in range(steps):
         with torch.autocast("cpu", torch.bfloat16, enabled=choose_precision(torch.device("cpu")) == "bfloat16"):
             logits, offsets = network(to_tensor(pictures))
         loss = multibox_loss(logits.float(), offsets.float(), *targets)
-        optimiser.zero_grad()
+        optimizer.zero_grad()
         loss.total.backward()
-        optimiser.step()
+        optimizer.step()
         losses.append(loss.total.item())
     assert losses[-1] < share * losses[0]
 

@@ -21,7 +21,7 @@ from tracker.detection.priors import (
     encode,
     match,
     prior_boxes,
-    to_centres,
+    to_centers,
     to_corners,
 )
 
@@ -74,7 +74,7 @@ def test_a_code_is_the_shift_over_the_variances() -> None:
     prior = np.array([[0.5, 0.5, 0.2, 0.4]])
     box = to_corners(np.array([[0.52, 0.46, 0.2 * math.e**0.2, 0.4]]))
     np.testing.assert_allclose(encode(box, prior), [[1.0, -1.0, 1.0, 0.0]], atol=1e-12)
-    np.testing.assert_allclose(to_centres(to_corners(prior)), prior)
+    np.testing.assert_allclose(to_centers(to_corners(prior)), prior)
 
 
 NOBODY, NEARLY = -1, -2

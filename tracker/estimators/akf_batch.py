@@ -7,14 +7,14 @@ import math
 import numpy as np
 
 from baselines.followers.calibration import NoiseModel
-from tracker.estimators.filters import chi2_quantile
+from tracker.estimators import chi2_quantile
 
 
 class BatchFilter:
     """Turns `measurement` observations (n, 8) into estimates of the same layout.
 
     Bearing and distance become the filter's, validity says whether there is an estimate yet; the rest stays. The
-    arithmetic is that of `tracker.estimators.filters.AdaptiveKalmanFilter` (eqs. (15)-(23)), all worlds at once.
+    arithmetic is that of `tracker.estimators.AdaptiveKalmanFilter` (eqs. (15)-(23)), all worlds at once.
 
     Args:
         worlds: how many.

@@ -1,0 +1,113 @@
+"""`Follower`: perception + estimator + controller; its belief is part of its state, so that it can be measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from baselines.controllers import Controller
+from baselines.controllers.pi import PIController
+from baselines.followers.calibration import Pair
+from baselines.followers.perception import Percept
+from follow_env.config import RobotConfig
+from tracker.estimators import Estimate, Estimator
+
+
+@dataclass
+class FollowerState:
+    """What a follower remembers within one episode.
+
+    Attributes:
+        estimator, controller: their memory.
+        measurement: latest measurement (bearing rad, distance m), or None when the last step had none.
+        estimate: latest estimate, or None while nothing was ever measured.
+    """
+
+    estimator: Estimator
+    controller: Controller
+    measurement: Pair | None = None
+    estimate: Estimate | None = None
+
+
+class Follower:
+    """Perception, then estimation, then control; stands still until the person was seen once.
+
+    Args:
+        perceive: turns one observation into (measurement, odometry twist).
+        make_estimator: returns a fresh estimator for an episode.
+        make_controller: returns a fresh controller for an episode.
+        robot: gives the scale of the twist action.
+        dt: control period, s.
+    """
+
+    def __init__(
+        self,
+        perceive: Callable[[Any], Percept],
+        make_estimator: Callable[[], Estimator],
+        make_controller: Callable[[], Controller] = PIController.from_paper,
+        robot: RobotConfig | None = None,
+        dt: float = 1.0 / 30.0,
+    ) -> None:
+        self._perceive = perceive
+        self._make_estimator, self._make_controller = make_estimator, make_controller
+        robot = robot or RobotConfig()
+        self._scale = (robot.max_speed, robot.max_yaw_rate)
+        self._dt = dt
+
+    def predict(
+        self,
+        observation: Any,
+        state: Any = None,
+        episode_start: np.ndarray | None = None,
+        deterministic: bool = True,
+    ) -> tuple[np.ndarray, Any]:
+        """Return (action, state) for one observation, or for a batch of n with a list of n states.
+
+        Args:
+            observation: of the mode that the perception reads, single or batched along the first axis.
+            state: what the last call returned; None at the start.
+            episode_start: (n,) or scalar; True forgets the state.
+            deterministic: followers always are.
+
+        Returns:
+            Actions float32 in [-1, 1], (2,) or (n, 2): the twist as shares of the robot's limits.
+        """
+        batch = _split(observation)
+        if batch is None:
+            starts = state is None or (episode_start is not None and bool(np.any(episode_start)))
+            return self._step(observation, None if starts else state)
+        flags = np.zeros(len(batch), bool) if episode_start is None else np.asarray(episode_start).reshape(-1)
+        states = [None] * len(batch) if state is None else state
+        results = [self._step(o, None if f else s) for o, s, f in zip(batch, states, flags, strict=True)]
+        return np.stack([action for action, _ in results]), [new for _, new in results]
+
+    def _step(self, observation: Any, state: Any) -> tuple[np.ndarray, FollowerState]:
+        if state is None:
+            state = FollowerState(self._make_estimator(), self._make_controller())
+        measurement, twist = self._perceive(observation)
+        return self._drive(state, measurement, twist), state
+
+    def _drive(self, state: FollowerState, measurement: Pair | None, twist: Pair) -> np.ndarray:
+        """Estimate, and return the controller's action."""
+        state.measurement = measurement
+        state.estimator.predict(twist, self._dt)
+        state.estimate = state.estimator.update(measurement)
+        if state.estimate is None:
+            return self._action(0.0, 0.0)
+        return self._action(*state.controller.command(state.estimate.bearing, state.estimate.distance, self._dt))
+
+    def _action(self, v: float, omega: float) -> np.ndarray:
+        shares = (v / self._scale[0], omega / self._scale[1])
+        return np.array([min(max(share, -1.0), 1.0) for share in shares], np.float32)
+
+
+def _split(observation: Any) -> list[Any] | None:
+    """Return the single observations of a batch, or None when the observation is a single one."""
+    if isinstance(observation, Mapping):
+        if observation["depth"].ndim == 2:
+            return None
+        return [{key: value[i] for key, value in observation.items()} for i in range(len(observation["depth"]))]
+    return None if np.ndim(observation) == 1 else list(observation)

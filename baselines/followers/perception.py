@@ -1,0 +1,75 @@
+"""Perception: from an observation to a measurement (bearing, distance) and the odometry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from baselines.followers.calibration import Pair
+from follow_env.config import CameraConfig, RobotConfig, choose
+from follow_env.geometry import Intrinsics
+from tracker.depth import Rule, measure
+
+Percept = tuple[Pair | None, Pair]
+"""A measurement (bearing rad, distance m) or None, and the odometry twist (v m/s, omega rad/s)."""
+
+OBSERVATION_OF = {"truth": "state", "emulated": "measurement", "mask": "rgbd_box", "detector": "rgbd"}
+"""Perception -> the environment's observation mode that it reads."""
+
+
+def perceive_state(observation: np.ndarray) -> Percept:
+    """Read the truth from a `state` observation."""
+    bearing, distance, _, _, v, omega, _, _ = observation.tolist()
+    return (bearing, distance), (v, omega)
+
+
+def perceive_measurement(observation: np.ndarray) -> Percept:
+    """Read the tracker's report from a `measurement` observation; no measurement when it is not valid."""
+    bearing, distance, valid, _, v, omega, _, _ = observation.tolist()
+    return ((bearing, distance) if valid else None), (v, omega)
+
+
+def perceive_odometry(observation: Mapping[str, np.ndarray]) -> Percept:
+    """Read the odometry that comes with a picture; whoever looks at the picture measures."""
+    v, omega = observation["twist"].tolist()
+    return None, (v, omega)
+
+
+@dataclass(frozen=True)
+class BoxPerception:
+    """Measures from RGB-D and a box: the `mask` rung. Depth is read from the box by `rule`, eqs. (24)-(31)."""
+
+    intrinsics: Intrinsics
+    camera_forward: float
+    rule: Rule = "six_smallest"
+
+    def __call__(self, observation: Mapping[str, np.ndarray]) -> Percept:
+        """Return (measurement or None, odometry twist) from an `rgbd_box` observation."""
+        v, omega = observation["twist"].tolist()
+        u0, v0, u1, v1 = observation["box"].tolist()
+        if u1 <= u0:
+            return None, (v, omega)
+        box = (u0, v0, u1, v1)
+        return measure(observation["depth"], box, self.intrinsics, self.camera_forward, self.rule), (v, omega)
+
+
+def make_perception(
+    name: str, camera: CameraConfig | None = None, robot: RobotConfig | None = None, rule: Rule = "six_smallest"
+) -> Callable[[Any], Percept]:
+    """Return the perception `name` for a camera on a robot: a key of `OBSERVATION_OF` that needs no memory."""
+    choose("perception", name, (known for known in OBSERVATION_OF if known != "detector"))
+    if name == "truth":
+        return perceive_state
+    if name == "emulated":
+        return perceive_measurement
+    camera, robot = camera or CameraConfig(), robot or RobotConfig()
+    return BoxPerception(intrinsics_of(camera), robot.camera_forward, rule)
+
+
+def intrinsics_of(camera: CameraConfig) -> Intrinsics:
+    """Return the intrinsics of a camera's pictures."""
+    return Intrinsics.from_hfov(camera.width, camera.height, math.radians(camera.hfov_deg))

@@ -21,13 +21,13 @@ from baselines.benchmark.executors.processes import EpisodeError, play_all
 from baselines.benchmark.progress import progress
 from baselines.benchmark.provenance import Plan
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 CELL = Cell("emulated", "corridor", "kf")
 
 
 @pytest.fixture
 def synthetic(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    monkeypatch.syspath_prepend(Path(__file__).parent)
+    monkeypatch.syspath_prepend(Path(__file__).parents[1])
     return importlib.import_module("synthetic")
 
 
@@ -160,7 +160,7 @@ def children(pid: int) -> set[int]:
 
 def test_workers_die_with_a_parent_that_is_killed(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "synthetic", str(tmp_path), "4", "2", "0.5"]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(Path(__file__).parent)])}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(Path(__file__).parents[1])])}
     with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE) as parent:
         deadline = time.monotonic() + 60
         while len(children(parent.pid)) < 3:  # two workers and multiprocessing's resource tracker

@@ -8,7 +8,7 @@ import pytest
 
 from baselines.cli import main as cli
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.mark.parametrize("action", ["train", "evaluate", "preview"])

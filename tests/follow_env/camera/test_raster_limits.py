@@ -15,7 +15,7 @@ from follow_env.world.people.mesh import Mesh, Placed
 from follow_env.world.scene import Box, Capsule, Cylinder, Light, Material, Sphere
 from follow_env.world.scenes import make_scene
 
-from .drawing import RED, SMALL, blob, frames_hash, reference, scene
+from ..drawing import RED, SMALL, blob, frames_hash, reference, scene
 
 
 def test_a_camera_inside_a_solid_sees_it_from_inside():

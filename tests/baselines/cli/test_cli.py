@@ -18,7 +18,7 @@ from baselines.benchmark.cells import Cell
 from baselines.benchmark.store import FILE_NAME
 from baselines.cli import main as cli
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 FOLLOW = [sys.executable, "-m", "baselines.cli.main"]
 TABLE1 = ["reproduce", "table1", "--perception", "truth", "--episodes", "1", "--jobs", "1"]
 

@@ -14,7 +14,7 @@ from follow_env.world.people.walker import Walker
 from follow_env.world.scene import Box, Capsule, Cylinder, Sphere
 from follow_env.world.scenes import SCENES, make_scene
 
-from .drawing import RED, SMALL, flat, scene
+from ..drawing import RED, SMALL, flat, scene
 
 
 def random_views(name, count, seed):

@@ -28,8 +28,8 @@ from baselines.papers.dong2018 import reproduce as reproduction
 from baselines.papers.dong2018.reproduce import reproduce
 from baselines.papers.dong2018.table1 import COLUMNS, PAPER_RMSE, paper_ratio
 
-ROOT = Path(__file__).resolve().parents[2]
-HERE = Path(__file__).parent
+ROOT = Path(__file__).resolve().parents[4]
+HERE = Path(__file__).parents[2]
 REPRODUCIBLE = {
     *("episodes.csv", "table1.csv", "table1.md", "curves.csv"),
     *("sensitivity.csv", "sensitivity_episodes.csv", "family.csv", "family_episodes.csv"),

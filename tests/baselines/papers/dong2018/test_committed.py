@@ -13,7 +13,7 @@ from baselines.benchmark.rollout import Player
 from baselines.followers import calibration
 from baselines.papers.dong2018.table1 import COLUMNS, Table1
 
-RUN = Path(__file__).parents[2] / "results" / "table1"
+RUN = Path(__file__).parents[4] / "results" / "table1"
 
 
 def rows():

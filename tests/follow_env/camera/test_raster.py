@@ -12,7 +12,7 @@ from follow_env.config import CameraConfig
 from follow_env.world.scene import Box, Capsule, Cylinder, Light, Sphere
 from follow_env.world.scenes import make_scene
 
-from .drawing import GRAY, RED, SMALL, blob, flat, reference, scene
+from ..drawing import GRAY, RED, SMALL, blob, flat, reference, scene
 
 CLUTTER = scene(
     Box((3.0, 0.6, 0.5), (0.8, 0.3, 1.0), RED, 0.7),

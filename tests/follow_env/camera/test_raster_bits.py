@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from . import drawing
+from .. import drawing
 
 GOLDEN = "83355e9f2639b0672c3fea40e62212fd944399a6180933887da02acc84afbf14"
 
@@ -25,7 +25,7 @@ def test_another_processor_gives_the_same_bits_and_compiles_once(tmp_path):
         "NUMBA_CPU_NAME": "generic",
         "NUMBA_CPU_FEATURES": "",
         "NUMBA_CACHE_DIR": str(tmp_path),
-        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), *sys.path]),
+        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[3]), *sys.path]),
     }
     code = f"import runpy; print(runpy.run_path({drawing.__file__!r})['golden']())"
     for announcement in (["compiling the camera, once"], []):

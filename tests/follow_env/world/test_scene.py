@@ -15,7 +15,7 @@ from follow_env.world.bullet import World
 from follow_env.world.scene import Box, Capsule, Cylinder, Material, Sphere
 from follow_env.world.scenes import LIGHTS, SCENES, make_scene
 
-from .drawing import RED, SMALL, scene
+from ..drawing import RED, SMALL, scene
 
 ROUND = (
     Sphere((3.0, 0.4, 0.6), 0.35, RED),

@@ -28,7 +28,7 @@ WEIGHTS = {net: "0" * 64 for net in NETS}
 
 def cut_short(patch: pytest.MonkeyPatch) -> ModuleType:
     """Leave one short film of Table 2, and return what stands for the nets."""
-    patch.syspath_prepend(Path(__file__).parent)
+    patch.syspath_prepend(Path(__file__).parents[2])
     patch.setattr(table2, "films", lambda share: [FILM])
     return importlib.import_module("suits")
 

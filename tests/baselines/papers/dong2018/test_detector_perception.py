@@ -190,7 +190,7 @@ def records(path):
 
 
 def test_the_cost_of_the_detector_is_what_the_raw_rows_say(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(Path(__file__).parent)
+    monkeypatch.syspath_prepend(Path(__file__).parents[2])
     synthetic = importlib.import_module("synthetic")
     metrics = TrackingMetrics()
     metrics.record({"time": 0.0, "bearing": 0.0, "distance": 1.5}, track(measured=True))

@@ -5,11 +5,12 @@ and names the nearest key when one is unknown.
 """
 
 import dataclasses
-import difflib
 import math
 import numbers
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
+
+from follow_env.registry import choose
 
 T = TypeVar("T")
 
@@ -322,16 +323,6 @@ HARSH_SENSOR = SensorConfig(
 noise, half the range, one frame in ten lost."""
 SENSORS = {"xtion": SensorConfig(), "xtion_harsh": HARSH_SENSOR, "ideal": IDEAL_SENSOR}
 """Named sensors."""
-
-
-def choose(what: str, value: Any, names: Iterable[str]) -> str:
-    """Return `value` if it is one of `names`; otherwise raise a ValueError that names the nearest."""
-    names = list(names)
-    if value in names:
-        return str(value)
-    near = difflib.get_close_matches(str(value), names, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise ValueError(f"{what} {value!r} is not known; expected one of {', '.join(map(repr, names))}{hint}")
 
 
 def build(what: str, base: T, data: Mapping[str, Any] | None) -> T:

@@ -16,7 +16,8 @@ from baselines.followers.calibration import NoiseModel, Pair, detector_settings,
 from baselines.followers.perception import OBSERVATION_OF
 from baselines.followers.policy import Policy
 from baselines.followers.references import FLOORS
-from follow_env.config import CameraConfig, choose
+from follow_env.config import CameraConfig
+from follow_env.registry import choose
 from tracker.person_tracker import Detector
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ import numpy as np
 from baselines.followers.calibration import Pair, noise_model
 from baselines.followers.networks import ACTIVATIONS, Arrays, Memory, Network
 from baselines.learned.recipes import CONTROL_HZ, ENVIRONMENT, OBSERVATIONS
-from follow_env.config import choose
+from follow_env.registry import choose
 from tracker.estimators import AdaptiveKalmanFilter, Estimate, Estimator
 
 SUFFIX = ".safetensors"

@@ -11,8 +11,9 @@ from baselines.followers.calibration import NoiseModel, Pair, noise_model
 from baselines.followers.follower import Follower
 from baselines.followers.perception import OBSERVATION_OF, Percept, intrinsics_of, make_perception
 from baselines.followers.tracking_follower import TrackingFollower
-from follow_env.config import CameraConfig, RobotConfig, choose
+from follow_env.config import CameraConfig, RobotConfig
 from follow_env.geometry import CameraMount
+from follow_env.registry import choose
 from tracker.depth import Rule
 from tracker.estimators import AdaptiveKalmanFilter, AugmentedKalmanFilter, Estimator, KalmanFilter, NoFilter
 from tracker.person_tracker import Detector, PersonTracker, TrackerSettings

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
-from follow_env.config import choose
+from follow_env.registry import choose
 
 Pair = tuple[float, float]
 

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from baselines.followers.calibration import Pair
-from follow_env.config import CameraConfig, RobotConfig, choose
+from follow_env.config import CameraConfig, RobotConfig
 from follow_env.geometry import Intrinsics
+from follow_env.registry import choose
 from tracker.depth import Rule, measure
 
 Percept = tuple[Pair | None, Pair]

@@ -8,7 +8,7 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-from follow_env.config import choose
+from follow_env.registry import choose
 
 ENVIRONMENT = "follow_env/*-v0"
 """The environments' version that agents are trained for."""

@@ -5,7 +5,7 @@ from typing import Protocol
 
 from follow_env.camera.frame import RGBDFrame
 from follow_env.camera.pinhole import CameraPose, PinholeCamera
-from follow_env.config import choose
+from follow_env.registry import choose
 from follow_env.world.people.mesh import Placed
 from follow_env.world.scene import Scene
 

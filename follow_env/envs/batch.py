@@ -15,12 +15,13 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from follow_env.compilation import announced
-from follow_env.config import RobotConfig, choose
+from follow_env.config import RobotConfig
 from follow_env.envs.follow import FollowEnv, _pose
 from follow_env.envs.kinematic.episode import CHEST_HEIGHT
 from follow_env.envs.kinematic.kernels import BEGIN, SKIP, STEP, play
 from follow_env.envs.kinematic.pictures import Pictures
 from follow_env.envs.task import SET_POINT, reward_terms
+from follow_env.registry import choose
 from follow_env.world.kinematic.philox import keys
 from follow_env.world.kinematic.place import pack_place
 from follow_env.world.kinematic.records import COLLISIONS, INFO, MOST_TURNS, ROUTE_NUMBERS, WORLD, pack_settings

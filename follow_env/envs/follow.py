@@ -11,7 +11,7 @@ from gymnasium import spaces
 
 from follow_env.camera import RENDERERS, CameraPose, PinholeCamera, Renderer, RGBDFrame, make_renderer
 from follow_env.camera.measurement import MeasurementModel
-from follow_env.config import CameraConfig, RobotConfig, SensorConfig, build, choose, sensor_config
+from follow_env.config import CameraConfig, RobotConfig, SensorConfig, build, sensor_config
 from follow_env.envs.dashboard import Dashboard, import_pygame, show_window
 from follow_env.envs.observations import MAX_DISTANCE, OBSERVATIONS, observation_space
 from follow_env.envs.task import (
@@ -22,6 +22,7 @@ from follow_env.envs.task import (
     SUCCESS_OUT_OF_VIEW,
     reward_terms,
 )
+from follow_env.registry import choose
 from follow_env.world.bullet import PERSON_RADIUS, PHYSICS_HZ, World
 from follow_env.world.motion.routes import PAPER_SPEED, Route, check_walking_speed, choose_route, make_route
 from follow_env.world.people.bodies import BODIES, OUTFITS, load_body

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import torch
 
-from follow_env.config import choose
+from follow_env.registry import choose
 from tracker.boxes import Detection, area, nms, vote
 from tracker.detection.networks import DEPTH_RANGE, NETS, MultiBoxNet
 from tracker.detection.priors import INPUT_SIZE, decode, prior_boxes

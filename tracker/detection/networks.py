@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import torch
 from torch import nn
 
-from follow_env.config import choose
+from follow_env.registry import choose
 from tracker.detection.priors import PAPER_LAYERS, SSD300_LAYERS, PriorLayer
 
 CLASSES = 2

@@ -24,7 +24,7 @@ from torch.utils.data import DataLoader, Dataset
 from baselines.learned.detector.data import DataConfig, SampleSource, without_augmentation
 from baselines.learned.detector.evaluation import Score, evaluate
 from baselines.learned.detector.loss import Loss, multibox_loss
-from follow_env.config import choose
+from follow_env.registry import choose
 from tracker.detection.detector import network_input, to_tensor
 from tracker.detection.networks import NETS, count_macs, count_parameters, make_network
 from tracker.detection.priors import match, prior_boxes

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from baselines.papers.zhang2018.table2 import NETS, OURS
-from follow_env.config import choose
+from follow_env.registry import choose
 from tracker.detection.detector import PersonDetector, shipped_weights
 
 

@@ -34,7 +34,7 @@ import numpy as np
 from baselines.benchmark.files import Value
 from baselines.papers.dong2018.figures import picture
 from baselines.papers.zhang2018.stage import CAMERA, PERIOD, SETTINGS, Picture, Watch, stage
-from follow_env.config import choose
+from follow_env.registry import choose
 from follow_env.world.people.bodies import SUITS, load_body
 from follow_env.world.people.walker import Walker
 from tracker.boxes import Detection

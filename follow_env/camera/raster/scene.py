@@ -7,7 +7,7 @@ import numpy as np
 
 from follow_env.camera.raster.shade import SOFT
 from follow_env.camera.raster.textures import TEXTURES
-from follow_env.config import choose
+from follow_env.registry import choose
 from follow_env.world.scene import Box, Capsule, Cylinder, Light, Material, Scene, Sphere
 
 FLOOR_THICKNESS = 0.1

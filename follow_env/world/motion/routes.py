@@ -14,8 +14,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from follow_env.config import choose
 from follow_env.envs.task import SET_POINT
+from follow_env.registry import choose
 from follow_env.world.scene import Scene
 
 TABLE_STEP = 0.1

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from follow_env.config import choose
+from follow_env.registry import choose
 from follow_env.world.people.mesh import Mesh
 
 ASSETS = Path(__file__).parent / "assets"

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from follow_env.config import choose
+from follow_env.registry import choose
 from follow_env.world.people import postures, stride
 from follow_env.world.people.bodies import ASSETS, Body
 from follow_env.world.people.mesh import Placed

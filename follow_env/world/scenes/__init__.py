@@ -4,7 +4,7 @@ import dataclasses
 import itertools
 from collections.abc import Callable
 
-from follow_env.config import choose
+from follow_env.registry import choose
 from follow_env.world.scene import Light, Scene
 from follow_env.world.scenes.cabin import cabin
 from follow_env.world.scenes.corridor import corridor

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from baselines.benchmark.cells import ESTIMATORS, PIXELS, Cell
 from baselines.followers.build import make_follower
-from baselines.followers.calibration import NoiseModel, Pair, detector_settings, noise_model, sensor
+from baselines.followers.calibration import detector_settings, noise_model, sensor
 from baselines.followers.perception import OBSERVATION_OF
 from baselines.followers.policy import Policy
 from baselines.followers.references import FLOORS
 from follow_env.config import CameraConfig
 from follow_env.registry import choose
+from tracker.estimators.base import NoiseModel, Pair
 from tracker.person_tracker import Detector
 
 if TYPE_CHECKING:

@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from baselines.followers.calibration import Pair, noise_model
+from baselines.followers.calibration import noise_model
 from baselines.followers.networks import ACTIVATIONS, Arrays, Memory, Network
 from baselines.learned.recipes import CONTROL_HZ, ENVIRONMENT, OBSERVATIONS
 from follow_env.registry import choose
 from tracker.estimators import AdaptiveKalmanFilter, Estimate, Estimator
+from tracker.estimators.base import Pair
 
 SUFFIX = ".safetensors"
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, cast
 
-from baselines.followers.calibration import NoiseModel, Pair, noise_model
+from baselines.followers.calibration import noise_model
 from baselines.followers.follower import Follower
 from baselines.followers.perception import OBSERVATION_OF, Percept, intrinsics_of, make_perception
 from baselines.followers.tracking_follower import TrackingFollower
@@ -16,6 +16,7 @@ from follow_env.geometry import CameraMount
 from follow_env.registry import choose
 from tracker.depth import Rule
 from tracker.estimators import AdaptiveKalmanFilter, AugmentedKalmanFilter, Estimator, KalmanFilter, NoFilter
+from tracker.estimators.base import NoiseModel, Pair
 from tracker.person_tracker import Detector, PersonTracker, TrackerSettings
 
 ESTIMATORS = ("none", "kf", "akf", "akf_cv")

@@ -9,28 +9,11 @@ from __future__ import annotations
 
 import functools
 import json
-from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
 from follow_env.registry import choose
-
-Pair = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class NoiseModel:
-    """Noise settings of the Kalman filters at one control rate; pairs are (bearing, distance).
-
-    Attributes:
-        measurement: R, variances in (rad^2, m^2).
-        process: Q per control step, variances in (rad^2, m^2).
-        acceleration: spectral densities of the augmented filter, (rad^2/s^3, m^2/s^3).
-    """
-
-    measurement: Pair
-    process: Pair
-    acceleration: Pair
+from tracker.estimators.base import NoiseModel
 
 
 @functools.cache

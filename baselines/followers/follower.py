@@ -10,10 +10,10 @@ import numpy as np
 
 from baselines.controllers import Controller
 from baselines.controllers.pi import PIController
-from baselines.followers.calibration import Pair
 from baselines.followers.perception import Percept
 from follow_env.config import RobotConfig
 from tracker.estimators import Estimate, Estimator
+from tracker.estimators.base import Pair
 
 
 @dataclass

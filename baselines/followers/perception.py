@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from baselines.followers.calibration import Pair
 from follow_env.config import CameraConfig, RobotConfig
 from follow_env.geometry import Intrinsics
 from follow_env.registry import choose
 from tracker.depth import Rule, measure
+from tracker.estimators.base import Pair
 
 Percept = tuple[Pair | None, Pair]
 """A measurement (bearing rad, distance m) or None, and the odometry twist (v m/s, omega rad/s)."""

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from baselines.followers.calibration import Pair
 from baselines.followers.policy import Policy
 from follow_env.config import RobotConfig
 from follow_env.envs.task import SET_POINT
 from tracker.estimators import Estimate
+from tracker.estimators.base import Pair
 
 
 @dataclass

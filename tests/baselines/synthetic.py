@@ -19,10 +19,10 @@ from baselines.benchmark.cells import Cell
 from baselines.benchmark.provenance import Plan
 from baselines.benchmark.rollout import Episode, play
 from baselines.followers.build import make_estimator
-from baselines.followers.calibration import NoiseModel
 from baselines.followers.follower import Follower
 from baselines.followers.perception import perceive_measurement
 from baselines.papers.dong2018.reproduce import reproduce
+from tracker.estimators.base import NoiseModel
 
 DT = 1.0 / 30.0
 SENSORS = ("clean", "heavy_tails")

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from baselines.followers.calibration import NoiseModel
 from tracker.estimators import chi2_quantile
+from tracker.estimators.base import NoiseModel
 
 
 class BatchFilter:

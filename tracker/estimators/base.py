@@ -61,6 +61,21 @@ class Estimator(Protocol):
         """Take in a measurement (bearing rad, distance m), or None for a miss; return None while nothing is known."""
 
 
+@dataclass(frozen=True)
+class NoiseModel:
+    """Noise settings of the Kalman filters at one control rate; pairs are (bearing, distance).
+
+    Attributes:
+        measurement: R, variances in (rad^2, m^2).
+        process: Q per control step, variances in (rad^2, m^2).
+        acceleration: spectral densities of the augmented filter, (rad^2/s^3, m^2/s^3).
+    """
+
+    measurement: Pair
+    process: Pair
+    acceleration: Pair
+
+
 def finite_pair(name: str, pair: Pair) -> Pair:
     """Return the pair as floats; a ValueError says that `name` is not finite."""
     first, second = pair

@@ -27,7 +27,6 @@ import numpy as np
 from baselines.benchmark.build import CAMERA
 from baselines.benchmark.cells import DEPTH_RULES, SCENES
 from baselines.followers.build import make_estimator
-from baselines.followers.calibration import NoiseModel
 from baselines.followers.follower import Follower
 from baselines.followers.perception import make_perception, perceive_measurement, perceive_state
 from baselines.papers.dong2018.table1 import PAPER_RMSE
@@ -35,6 +34,7 @@ from follow_env.config import CameraConfig, MeasurementConfig
 from follow_env.envs.follow import FollowEnv
 from tracker.depth import RULES, Rule
 from tracker.estimators import LockOutWarning, NoFilter
+from tracker.estimators.base import NoiseModel
 
 DT = 1.0 / 30.0
 ALPHA = 0.05

@@ -6,10 +6,10 @@ import pytest
 
 import follow_env
 from baselines.followers.build import make_follower
-from baselines.followers.calibration import NoiseModel
 from baselines.followers.follower import Follower
 from baselines.followers.perception import make_perception, perceive_measurement
 from tracker.estimators import NoFilter
+from tracker.estimators.base import NoiseModel
 
 NOISE = NoiseModel((1e-4, 1e-2), (1e-4, 1e-3), (1e-2, 1e-1))
 

@@ -6,9 +6,9 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 import follow_env
-from baselines.followers.calibration import NoiseModel
 from baselines.learned.adapter import FollowVecEnv
 from tracker.estimators.akf_batch import BatchFilter
+from tracker.estimators.base import NoiseModel
 
 CORRIDOR, INDOOR = follow_env.IDS["corridor"], follow_env.IDS["indoor"]
 

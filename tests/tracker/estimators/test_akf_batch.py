@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from baselines.followers.calibration import NoiseModel
 from tracker.estimators import AdaptiveKalmanFilter
 from tracker.estimators.akf_batch import BatchFilter
+from tracker.estimators.base import NoiseModel
 
 NOISE = NoiseModel((0.04, 0.01), (0.05, 0.02), (0.1, 0.1))
 DT = 1.0 / 30.0

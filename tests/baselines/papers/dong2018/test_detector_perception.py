@@ -19,7 +19,6 @@ from baselines.benchmark.rollout import Player
 from baselines.cli import main as cli
 from baselines.followers import policy
 from baselines.followers.build import make_follower
-from baselines.followers.calibration import NoiseModel
 from baselines.followers.tracking_follower import LOOK_RATE
 from baselines.papers.dong2018 import calibrate, figures
 from baselines.papers.dong2018.calibrate import DT, error_statistics
@@ -34,6 +33,7 @@ from tracker.boxes import Detection
 from tracker.detection.detector import GRID, PersonDetector
 from tracker.detection.networks import make_network
 from tracker.detection.weights import save_weights
+from tracker.estimators.base import NoiseModel
 from tracker.person_tracker import Track
 
 NOISE = NoiseModel((3.5e-4, 1.7e-4), (8e-4, 2.4e-3), (9e-2, 2.3e-1))

@@ -42,7 +42,7 @@ def follow(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
 )
 def test_help_imports_nothing_heavy(arguments: list[str], tmp_path: Path) -> None:
     script = (
-        "import sys\nfrom baselines import cli\n"
+        "import sys\nfrom baselines.cli import main as cli\n"
         f"try:\n    cli.main({arguments!r})\nexcept SystemExit as end:\n    assert end.code == 0\n"
         "print(*({'numpy', 'pybullet', 'matplotlib', 'gymnasium', 'cv2', 'scipy', 'torch', 'tqdm'} & set(sys.modules)))"
     )

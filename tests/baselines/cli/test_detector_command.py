@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[3]
 @pytest.mark.parametrize("action", ["train", "evaluate", "preview"])
 def test_help_imports_nothing_heavy(action: str) -> None:
     script = (
-        "import sys\nfrom baselines import cli\n"
+        "import sys\nfrom baselines.cli import main as cli\n"
         f"try:\n    cli.main(['detector', {action!r}, '--help'])\nexcept SystemExit as end:\n    assert end.code == 0\n"
         "print(*({'numpy', 'cv2', 'torch', 'safetensors', 'matplotlib', 'numba'} & set(sys.modules)))"
     )

@@ -88,7 +88,7 @@ def test_a_killed_writer_loses_nothing_that_it_had_finished(tmp_path: Path) -> N
     generator = random.Random(0)
     told = -1
     for _ in range(4):
-        command = [sys.executable, "-c", script, str(tmp_path), str(Path(__file__).parents[1])]
+        command = [sys.executable, "-c", script, str(tmp_path), str(Path(__file__).parent)]
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as writer:
             assert writer.stdout is not None

@@ -17,7 +17,7 @@ from baselines.benchmark.metrics.tracking import TrackingMetrics
 from baselines.benchmark.provenance import Plan
 from baselines.benchmark.rollout import Player
 from baselines.cli import main as cli
-from baselines.followers import policy
+from baselines.followers import build
 from baselines.followers.build import make_follower
 from baselines.followers.tracking_follower import LOOK_RATE
 from baselines.papers.dong2018 import calibrate, figures
@@ -237,9 +237,9 @@ def test_the_cost_of_the_detector_is_what_the_raw_rows_say(tmp_path, monkeypatch
 def test_the_follower_is_told_the_noise_between_measurements_at_any_control_rate(monkeypatch):
     """Ten measurements a second: what Q adds between two of them does not depend on the steps it is spread over."""
     told = []
-    monkeypatch.setattr(policy, "noise_model", lambda *_: NOISE)
-    monkeypatch.setattr(policy, "make_estimator", lambda _, noise, alpha: told.append(noise.process))
-    monkeypatch.setattr(policy, "_tracker_factory", lambda *_: None)
+    monkeypatch.setattr(build, "noise_model", lambda *_: NOISE)
+    monkeypatch.setattr(build, "make_estimator", lambda _, noise, alpha: told.append(noise.process))
+    monkeypatch.setattr(build, "_tracker_factory", lambda *_: None)
     for control_hz, steps in ((30, 3), (60, 6), (20, 2)):
         make_follower("akf", "detector", control_hz=control_hz)
         assert told.pop() == pytest.approx([3 * q / steps for q in NOISE.process])

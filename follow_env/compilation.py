@@ -1,13 +1,31 @@
-"""What compiled functions share: the digest of their sources, and the line that says what is being compiled."""
+"""What compiled functions share: plain functions they call, a digest of their sources, their announcement.
+
+Scalar maths that both a Python class and a compiled loop need is written once, as a plain function of numbers beside
+the thing it describes. Python calls it as it stands. `compilable` lets compiled code call it by its name.
+"""
 
 import sys
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
 
 from numba.core import event
+from numba.extending import register_jitable
+
+_COMPILABLE: set[Callable[..., Any]] = set()
+
+
+def compilable(*functions: Callable[..., Any]) -> None:
+    """Let compiled code call these plain functions by their names; they stay as they are for Python.
+
+    Arguments that a function reads attributes of may be an object in Python and a record in compiled code.
+    """
+    for function in functions:
+        if function not in _COMPILABLE:
+            _COMPILABLE.add(function)
+            register_jitable(nogil=True, error_model="numpy", forceinline=True)(function)
 
 
 def digest(paths: Iterable[Path]) -> int:

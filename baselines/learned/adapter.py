@@ -15,6 +15,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from stable_baselines3.common.vec_env import VecEnv
 
+from follow_env.envs.observations import state_values
 from tracker.estimators.akf_batch import BatchFilter
 
 _EPISODE_KEYS = ("is_success", "collision")
@@ -109,14 +110,11 @@ class FollowVecEnv(VecEnv):
         """Return the truth of all worlds as `state` observations (n, 8) with a zero last action: what teachers see."""
         parts = []
         for info in self._infos:
-            yaw, velocity = info["robot_pose"][:, 2], info["person_velocity"]
-            cosine, sine = np.cos(yaw), np.sin(yaw)
-            ahead = cosine * velocity[:, 0] + sine * velocity[:, 1]
-            left = cosine * velocity[:, 1] - sine * velocity[:, 0]
+            yaw = info["robot_pose"][:, 2]
             none = np.zeros(len(yaw))
-            parts.append(
-                np.column_stack((info["bearing"], info["distance"], ahead, left, *info["twist"].T, none, none))
-            )
+            direction, own = (np.cos(yaw), np.sin(yaw)), (*info["twist"].T, none, none)
+            velocity = info["person_velocity"].T
+            parts.append(np.column_stack(state_values(info["bearing"], info["distance"], velocity, direction, own)))
         return np.concatenate(parts)
 
     def close(self) -> None:

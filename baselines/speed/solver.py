@@ -8,7 +8,8 @@ from functools import partial
 
 from baselines.speed.timing import Cost, measure
 from follow_env.config import RobotConfig
-from follow_env.world.bullet import PHYSICS_HZ, SOLVER_ITERATIONS, World
+from follow_env.world.bullet import SOLVER_ITERATIONS, World
+from follow_env.world.clock import PHYSICS_HZ
 from follow_env.world.robots.diff_drive import DiffDrive, advance
 from follow_env.world.scene import Material, Scene
 from follow_env.world.scenes import make_scene

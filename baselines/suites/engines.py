@@ -22,7 +22,7 @@ from baselines.papers.dong2018.report import markdown_table
 from follow_env.config import RobotConfig
 from follow_env.envs.batch import FollowVectorEnv
 from follow_env.envs.follow import FollowEnv
-from follow_env.world.bullet import PHYSICS_HZ
+from follow_env.world.clock import PHYSICS_HZ
 from follow_env.world.kinematic.drive import roll
 from follow_env.world.robots.diff_drive import DiffDrive
 from tracker.estimators import LockOutWarning

@@ -17,20 +17,19 @@ from gymnasium.vector.utils import batch_space
 from follow_env.compilation import announced
 from follow_env.config import RobotConfig
 from follow_env.envs.follow import FollowEnv, _pose
-from follow_env.envs.kinematic.episode import CHEST_HEIGHT
 from follow_env.envs.kinematic.kernels import BEGIN, SKIP, STEP, play
 from follow_env.envs.kinematic.pictures import Pictures
-from follow_env.envs.task import SET_POINT, reward_terms
+from follow_env.envs.task import REWARD_TERMS, SET_POINT
 from follow_env.registry import choose
 from follow_env.world.kinematic.philox import keys
 from follow_env.world.kinematic.place import pack_place
 from follow_env.world.kinematic.records import COLLISIONS, INFO, MOST_TURNS, ROUTE_NUMBERS, WORLD, pack_settings
 from follow_env.world.motion.routes import Route, choose_route, make_route
+from follow_env.world.people.dimensions import CHEST_HEIGHT
 
 OBSERVATIONS = ("measurement", "state", "rgbd", "rgbd_uint8")
 WORLDS_PER_THREAD = 512
 """A thread is worth its while from this many worlds."""
-_TERMS = tuple(reward_terms(0.0, SET_POINT, True, 0.0, False))
 _LABELS = np.array(COLLISIONS, object)
 
 
@@ -323,8 +322,8 @@ def _report(infos: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
     result: dict[str, Any] = {}
     for name in INFO.names or ():
         if name == "rewards":
-            terms = {term: infos[name][:, k] for k, term in enumerate(_TERMS)}
-            result[name] = {**terms, **{f"_{term}": mask for term in _TERMS}}
+            terms = {term: infos[name][:, k] for k, term in enumerate(REWARD_TERMS)}
+            result[name] = {**terms, **{f"_{term}": mask for term in REWARD_TERMS}}
         else:
             result[name] = _LABELS[infos[name]] if name == "collision_with" else infos[name]
         result[f"_{name}"] = mask

@@ -12,22 +12,25 @@ from gymnasium import spaces
 from follow_env.camera import RENDERERS, CameraPose, PinholeCamera, Renderer, RGBDFrame, make_renderer
 from follow_env.camera.measurement import MeasurementModel
 from follow_env.config import CameraConfig, RobotConfig, SensorConfig, build, sensor_config
+from follow_env.envs import task
 from follow_env.envs.dashboard import Dashboard, import_pygame, show_window
-from follow_env.envs.observations import MAX_DISTANCE, OBSERVATIONS, observation_space
-from follow_env.envs.task import (
-    BAND_BEARING,
-    BAND_DISTANCE,
-    SET_POINT,
-    SUCCESS_BAND_SHARE,
-    SUCCESS_OUT_OF_VIEW,
-    reward_terms,
+from follow_env.envs.observations import (
+    OBSERVATIONS,
+    measurement_values,
+    no_measurement_values,
+    observation_space,
+    state_values,
 )
+from follow_env.envs.task import REWARD_TERMS, SET_POINT
+from follow_env.envs.truth import in_view, seen_from_robot, surface_distance
 from follow_env.registry import choose
-from follow_env.world.bullet import PERSON_RADIUS, PHYSICS_HZ, World
+from follow_env.world.bullet import World
+from follow_env.world.clock import PHYSICS_HZ
 from follow_env.world.motion.routes import PAPER_SPEED, Route, check_walking_speed, choose_route, make_route
 from follow_env.world.people.bodies import BODIES, OUTFITS, load_body
 from follow_env.world.people.mesh import Placed
 from follow_env.world.people.walker import Walker
+from follow_env.world.robots.diff_drive import is_saturated
 from follow_env.world.scenes import make_scene
 
 if TYPE_CHECKING:
@@ -38,10 +41,6 @@ SETTINGS = (
     *("scene", "obs", "action", "route", "sensor", "camera", "robot", "renderer", "light", "control_hz", "latency_s"),
     *("person", "outfit", "walking_speed", "render_mode"),
 )
-LOST_AFTER = 5.0
-"""The episode ends when the person was out of view for longer than this, s."""
-HALF_TRUNK = 0.16
-"""The person counts as visible while any of the trunk, this far to either side of its axis, is in view, m."""
 
 
 class FollowEnv(gymnasium.Env):
@@ -203,7 +202,7 @@ class FollowEnv(gymnasium.Env):
         if self._dashboard is not None:
             self._dashboard.reset()
         self._look()
-        self._rewards = dict.fromkeys(reward_terms(0.0, SET_POINT, True, 0.0, False), 0.0)
+        self._rewards = dict.fromkeys(REWARD_TERMS, 0.0)
         self._saturated = False
         self._collision = "none"
         observation = self._observe()
@@ -232,20 +231,19 @@ class FollowEnv(gymnasium.Env):
         self._person_pose = self._route.pose(self.time)
         self._world.place_person(self._person_pose)
         self._twist = self._world.step(*wheels, self._substeps)
-        left, right = self._world.wheel_command
-        self._saturated = max(abs(left - wheels[0]), abs(right - wheels[1])) > 1e-9
+        self._saturated = is_saturated(*wheels, *self._world.wheel_command)
         self._collision = self._world.collision()
         self._look()
-        effort = max(abs(first - float(self._last_action[0])), abs(second - float(self._last_action[1])))
+        effort = task.effort(first, second, *self._last_action.tolist())
         self._last_action = np.array((first, second), np.float32)
         collided = self._collision != "none"
-        self._rewards = reward_terms(self._bearing, self._distance, self._visible, effort, collided)
-        terminated = collided or self._out_of_view * self.dt > LOST_AFTER
-        truncated = not terminated and self.time >= self._route.duration - 1e-9
+        terms = task.reward_terms(self._bearing, self._distance, self._visible, effort, collided)
+        self._rewards = dict(zip(REWARD_TERMS, terms, strict=True))
+        terminated, truncated = task.ends(collided, self._out_of_view * self.dt, self.time, self._route.duration)
         observation = self._observe()
         info = self._info()
         self._show(info)
-        return observation, sum(self._rewards.values()), terminated, truncated, info
+        return observation, task.total(terms), terminated, truncated, info
 
     def render(self) -> Any:
         """Return the dashboard (H, W, 3) uint8, or the robot's (rgb, depth), or None in `human` mode."""
@@ -317,59 +315,38 @@ class FollowEnv(gymnasium.Env):
         self._robot_pose = self._world.robot_pose()
         self._person_velocity = self._route.velocity(self.time)
         x, y, yaw = self._robot_pose
-        dx, dy = self._person_pose[0] - x, self._person_pose[1] - y
         cosine, sine = math.cos(yaw), math.sin(yaw)
-        self._distance, left = cosine * dx + sine * dy, -sine * dx + cosine * dy
-        self._bearing = math.atan2(left, self._distance)
-        self._surface_distance = max(math.sqrt(dx * dx + dy * dy) - self.robot_config.hull_radius - PERSON_RADIUS, 0.0)
-        self._visible = self._in_view(self._distance - self.robot_config.camera_forward, left, cosine, sine)
+        person_x, person_y, _ = self._person_pose
+        self._bearing, self._distance, left = seen_from_robot(x, y, cosine, sine, person_x, person_y)
+        robot = self.robot_config
+        self._surface_distance = surface_distance(x, y, person_x, person_y, robot.hull_radius)
+        forward = robot.camera_forward
+        eye = x + forward * cosine, y + forward * sine, robot.camera_height
+        person, direction, depth = (person_x, person_y), (cosine, sine), self._distance - forward
+        sight = type(self._world).line_of_sight
+        self._visible = in_view(sight, self._world, eye, person, direction, depth, left, self._half_field)
         self._out_of_view = 0 if self._visible else self._out_of_view + 1
         self._longest_out_of_view = max(self._longest_out_of_view, self._out_of_view)
-        low, high = BAND_DISTANCE
-        self._in_band += low <= self._distance <= high and abs(self._bearing) <= BAND_BEARING
-
-    def _in_view(self, depth: float, left: float, cosine: float, sine: float) -> bool:
-        """Whether any of the trunk (axis, left or right side) is in the camera's field with a free line of sight.
-
-        Args:
-            depth: of the person ahead of the camera, m.
-            left: of the person to the left of the optical axis, m.
-            cosine: of the robot's yaw.
-            sine: of the robot's yaw.
-        """
-        assert self._world is not None
-        if depth <= 0.3:
-            return False
-        reach = depth * self._half_field
-        eye = self.camera_pose()
-        x, y, _ = self._person_pose
-        for offset in (0.0, HALF_TRUNK, -HALF_TRUNK):
-            if abs(left + offset) <= reach:
-                point = (x - offset * sine, y + offset * cosine, 1.2)
-                if self._world.line_of_sight((eye.x, eye.y, eye.z), point):
-                    return True
-        return False
+        self._in_band += task.in_band(self._bearing, self._distance)
 
     def _observe(self) -> Any:
         """Return the observation, `latency_s` old in what was seen, current in odometry and action."""
-        own = (*self._twist, *(float(a) for a in self._last_action))
+        own = (*self._twist, *self._last_action.tolist())
         if self._obs == "state":
             yaw = self._robot_pose[2]
-            (vx, vy), cosine, sine = self._person_velocity, math.cos(yaw), math.sin(yaw)
-            return np.array(
-                (self._bearing, self._distance, cosine * vx + sine * vy, cosine * vy - sine * vx, *own), np.float32
-            )
+            direction = math.cos(yaw), math.sin(yaw)
+            values = state_values(self._bearing, self._distance, self._person_velocity, direction, own)
+            return np.array(values, np.float32)
         if self._obs == "measurement":
             seen = self._delayed(
                 self._measurement.measure(self._bearing, self._distance, self._visible, self.np_random)
             )
             if seen is None:
                 since = 0.0 if self._last_measured is None else self._last_measured
-                return np.array((0.0, 0.0, 0.0, self.time - since, *own), np.float32)
+                return np.array(no_measurement_values(self.time - since, own), np.float32)
             age = self._delay * self.dt
             self._last_measured = self.time - age
-            bearing = min(max(seen[0], -math.pi), math.pi)
-            return np.array((bearing, min(seen[1], MAX_DISTANCE), 1.0, age, *own), np.float32)
+            return np.array(measurement_values(seen[0], seen[1], age, own), np.float32)
         assert self._sensing is not None
         seen = self._delayed(self._sensing.sense(self.frame, self.time, self.np_random))
         if seen is None:
@@ -393,18 +370,14 @@ class FollowEnv(gymnasium.Env):
 
     def _info(self) -> dict[str, Any]:
         assert self._world is not None
-        steps = self._steps + 1
-        success = (
-            self._collision == "none"
-            and self._longest_out_of_view * self.dt <= SUCCESS_OUT_OF_VIEW + 1e-9
-            and self._in_band >= SUCCESS_BAND_SHARE * steps
-        )
+        longest, collided = self._longest_out_of_view * self.dt, self._collision != "none"
+        success = task.succeeds(collided, longest, self._in_band, self._steps + 1)
         info = {
             "time": self.time,
             "bearing": self._bearing,
             "distance": self._distance,
             "visible": self._visible,
-            "collision": self._collision != "none",
+            "collision": collided,
             "collision_with": self._collision,
             "surface_distance": self._surface_distance,
             "robot_pose": np.array(self._robot_pose),

@@ -1,6 +1,7 @@
-"""The observation modes of the environments and their spaces."""
+"""The observation modes of the environments, their spaces and what stands in them."""
 
 import math
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -36,3 +37,29 @@ def observation_space(obs: str, camera: PinholeCamera, robot: RobotConfig) -> sp
     if obs == "rgbd_box":
         parts["box"] = spaces.Box(0.0, np.array((width, height, width, height), np.float32), (4,), np.float32)
     return spaces.Dict(parts)
+
+
+def state_values(bearing: Any, distance: Any, velocity: Any, direction: Any, own: Any) -> tuple[Any, ...]:
+    """Return the eight numbers (or arrays of them) of a `state` observation.
+
+    Args:
+        bearing: truth, rad.
+        distance: truth, m.
+        velocity: of the person in the world frame (x, y), m/s.
+        direction: cosine and sine of the robot's yaw.
+        own: odometry v and omega, last action (2).
+    """
+    (vx, vy), (cosine, sine) = velocity, direction
+    ahead, left = cosine * vx + sine * vy, cosine * vy - sine * vx
+    return (bearing, distance, ahead, left, own[0], own[1], own[2], own[3])
+
+
+def measurement_values(bearing: float, distance: float, age: float, own: Any) -> tuple[float, ...]:
+    """Return the eight numbers of a `measurement` observation with a measurement that is `age` (s) old."""
+    bearing = min(max(bearing, -math.pi), math.pi)
+    return (bearing, min(distance, MAX_DISTANCE), 1.0, age, own[0], own[1], own[2], own[3])
+
+
+def no_measurement_values(since: float, own: Any) -> tuple[float, ...]:
+    """Return the eight numbers of a `measurement` observation without one since a time, s."""
+    return (0.0, 0.0, 0.0, since, own[0], own[1], own[2], own[3])

@@ -10,14 +10,13 @@ import numpy as np
 import pybullet
 
 from follow_env.config import RobotConfig
+from follow_env.world.clock import PHYSICS_HZ
+from follow_env.world.people import dimensions
 from follow_env.world.robots.diff_drive import DiffDrive
 from follow_env.world.scene import Box, Capsule, Cylinder, Primitive, Scene, Sphere
 
-PHYSICS_HZ = 240
 SOLVER_ITERATIONS = 10
 """Of the contact solver in each physics step; `follow speed` shows what fewer and more of them cost and give."""
-PERSON_RADIUS = 0.25
-PERSON_HEIGHT = 1.75
 CONTACT_BREAKING = 0.0005
 """Contact points farther apart than this are dropped, m: a rolling wheel keeps one point instead of a trail of four."""
 WHEEL_JOINTS = (0, 1)
@@ -99,7 +98,7 @@ class World:
     def place_person(self, pose: tuple[float, float, float]) -> None:
         """Move the person's collision capsule to the pose (x, y, heading)."""
         pybullet.resetBasePositionAndOrientation(
-            self.person, (pose[0], pose[1], 0.5 * PERSON_HEIGHT), (0.0, 0.0, 0.0, 1.0), physicsClientId=self._client
+            self.person, (pose[0], pose[1], 0.5 * dimensions.HEIGHT), (0.0, 0.0, 0.0, 1.0), physicsClientId=self._client
         )
 
     def step(self, left: float, right: float, substeps: int) -> tuple[float, float]:
@@ -213,12 +212,12 @@ class World:
     def _add_person(self) -> int:
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_CAPSULE,
-            radius=PERSON_RADIUS,
-            height=PERSON_HEIGHT - 2.0 * PERSON_RADIUS - 0.02,
+            radius=dimensions.RADIUS,
+            height=dimensions.STRAIGHT,
             physicsClientId=self._client,
         )
         return pybullet.createMultiBody(
-            0, shape, basePosition=(5.0, 0.0, 0.5 * PERSON_HEIGHT), physicsClientId=self._client
+            0, shape, basePosition=(5.0, 0.0, 0.5 * dimensions.HEIGHT), physicsClientId=self._client
         )
 
     def _add_robot(self) -> int:

@@ -5,8 +5,9 @@ World frame: x along the scene's main direction, y left, z up, floor at z = 0, m
 
 import functools
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -157,7 +158,7 @@ class Scene:
 
         Round obstacles count with their full radius; without obstacles the clearance is infinite.
         """
-        return float(self._distances(points).min())
+        return float(distances(points, self._footprints).min())
 
     def is_clear(self, points: np.ndarray, least: float) -> bool:
         """Whether `clearance(points) >= least` (m); a table decides about most of the points (n, 2)."""
@@ -169,17 +170,6 @@ class Scene:
         undecided = ~(about > least + CELL_REACH)
         return not undecided.any() or self.clearance(points[undecided]) >= least
 
-    def _distances(self, points: np.ndarray) -> np.ndarray:
-        """Return the clearance of each of the points (n, 2), m."""
-        centers, halves, axes, radii = self._footprints
-        offset = points[:, None, :] - centers
-        along = np.abs(offset[..., 0] * axes[:, 0] + offset[..., 1] * axes[:, 1])
-        across = np.abs(offset[..., 1] * axes[:, 0] - offset[..., 0] * axes[:, 1])
-        gap_x, gap_y = np.maximum(along - halves[:, 0], 0.0), np.maximum(across - halves[:, 1], 0.0)
-        distances = np.maximum(np.sqrt(gap_x * gap_x + gap_y * gap_y) - radii, 0.0)
-        least: np.ndarray = distances.min(axis=1, initial=math.inf)
-        return least
-
     @functools.cached_property
     def _table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Clearance at the middle of each cell, framed by cells that say NaN: unknown; its corner and last indices."""
@@ -188,20 +178,12 @@ class Scene:
         table = np.full((math.ceil((x1 - x0) / CELL) + 2, math.ceil((y1 - y0) / CELL) + 2), np.nan)
         middles = origin + CELL * (np.moveaxis(np.indices(table.shape), 0, -1) + 0.5)
         for column, points in zip(table[1:-1, 1:-1], middles[1:-1, 1:-1], strict=True):
-            column[:] = self._distances(points)
+            column[:] = distances(points, self._footprints)
         return table, origin, np.array(table.shape) - 1.0
 
     @functools.cached_property
-    def _footprints(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Centers (n, 2), half sizes (n, 2), cosine and sine of the yaw (n, 2) and rounding radii (n,) of obstacles."""
-        rows = {
-            (*p.center[:2], 0.5 * p.size[0], 0.5 * p.size[1], math.cos(p.yaw), math.sin(p.yaw), 0.0)
-            if isinstance(p, Box)
-            else (*p.center[:2], 0.0, 0.0, 1.0, 0.0, p.radius)
-            for p in self.obstacles()
-        }
-        table = np.array(sorted(rows)).reshape(-1, 7)
-        return table[:, :2], table[:, 2:4], table[:, 4:6], table[:, 6]
+    def _footprints(self) -> np.ndarray:
+        return footprints(self.obstacles())
 
     def illumination(self, x: float, y: float) -> float:
         """Relative brightness at the floor point (x, y): lamps with inverse-square falloff, about 1 under a lamp."""
@@ -210,6 +192,45 @@ class Scene:
             dx, dy, dz = light.position[0] - x, light.position[1] - y, light.position[2] - 1.0
             total += light.intensity * dz * dz / (dx * dx + dy * dy + dz * dz)
         return total
+
+
+def footprints(obstacles: Iterable[Primitive]) -> np.ndarray:
+    """Return obstacles as seen from above, each once, (n, 7): the arguments of `gap` behind the point's, x and y first.
+
+    Columns: x, y, half length, half width, cosine and sine of the yaw, radius; m.
+    """
+    rows = {
+        (*p.center[:2], 0.5 * p.size[0], 0.5 * p.size[1], math.cos(p.yaw), math.sin(p.yaw), 0.0)
+        if isinstance(p, Box)
+        else (*p.center[:2], 0.0, 0.0, 1.0, 0.0, p.radius)
+        for p in obstacles
+    }
+    return np.array(sorted(rows)).reshape(-1, 7)
+
+
+def gap(dx: Any, dy: Any, length: Any, width: Any, cosine: Any, sine: Any, radius: Any) -> Any:
+    """Return the horizontal distance from a point to a rectangle (half sizes) grown by `radius`, m; 0 inside.
+
+    Args:
+        dx: from the rectangle's middle to the point along x, m; like all arguments a number, or an array that
+            broadcasts.
+        dy: along y, m.
+        length: half size along the rectangle's own x axis, m.
+        width: half size along its y axis, m.
+        cosine: of the rectangle's yaw.
+        sine: of the rectangle's yaw.
+        radius: m.
+    """
+    along = np.maximum(np.abs(dx * cosine + dy * sine) - length, 0.0)
+    across = np.maximum(np.abs(dy * cosine - dx * sine) - width, 0.0)
+    return np.maximum(np.sqrt(along * along + across * across) - radius, 0.0)
+
+
+def distances(points: np.ndarray, obstacles: np.ndarray) -> np.ndarray:
+    """Return how far each of the points (n, 2) is from the next of the footprints (m, 7), m; infinite without any."""
+    offset = points[:, None, :] - obstacles[:, :2]
+    least: np.ndarray = gap(offset[..., 0], offset[..., 1], *obstacles[:, 2:].T).min(axis=1, initial=math.inf)
+    return least
 
 
 def _check(primitive: Primitive, place: tuple[float, ...], lengths: tuple[float, ...]) -> None:

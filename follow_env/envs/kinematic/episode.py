@@ -6,21 +6,23 @@ import math
 import numpy as np
 from numba import njit
 
-from follow_env.envs.follow import HALF_TRUNK, LOST_AFTER
-from follow_env.envs.observations import MAX_DISTANCE
-from follow_env.envs.task import BAND_BEARING, BAND_DISTANCE, SET_POINT, SUCCESS_BAND_SHARE, SUCCESS_OUT_OF_VIEW
-from follow_env.world.bullet import PERSON_RADIUS
-from follow_env.world.kinematic.drive import limit, roll
+from follow_env.camera.measurement import gauss_markov, measured, next_errors
+from follow_env.compilation import compilable
+from follow_env.envs import task
+from follow_env.envs.observations import measurement_values, no_measurement_values, state_values
+from follow_env.envs.task import SET_POINT
+from follow_env.envs.truth import in_view, seen_from_robot, surface_distance
+from follow_env.world.kinematic.drive import roll
 from follow_env.world.kinematic.philox import NOISE, OUTLIER, PICTURE, START, normals, uniforms, words
 from follow_env.world.kinematic.place import free_sight, touches_person, touches_place
-from follow_env.world.kinematic.route import advance_person, draw_route, heading_at, speed_at, velocity, walked_at
+from follow_env.world.kinematic.route import advance_person, draw_route, heading_of, speed_of, velocity, walked_of
+from follow_env.world.robots.diff_drive import is_saturated, limited, twist_of, wheel_speeds
 
-CHEST_HEIGHT = 1.2
-"""Height at which the person is looked for, m."""
-NEAREST_SEEN = 0.3
-"""Persons nearer to the camera than this are not seen, m."""
-_LOW, _HIGH = BAND_DISTANCE
-
+compilable(gauss_markov, measured, next_errors)
+compilable(measurement_values, no_measurement_values, state_values)
+compilable(task.reward_terms, task.effort, task.in_band, task.ends, task.succeeds)
+compilable(in_view, seen_from_robot, surface_distance)
+compilable(is_saturated, limited, twist_of, wheel_speeds)
 _jit = njit(nogil=True, error_model="numpy", forceinline=True)
 
 
@@ -44,7 +46,7 @@ def begin(world, settings, place):
         world.route_heading = settings.start_yaw
         fits = draw_route(world, place, settings.stretch)
     world.given_pose, world.given_route, world.route = False, False, settings.route
-    world.heading = heading_at(world, 0.0)
+    world.heading = heading_of(world, 0.0)
     world.person_vx, world.person_vy = velocity(world, 0.0)
     world.left, world.right, world.command_left, world.command_right = 0.0, 0.0, 0.0, 0.0
     world.v, world.omega, world.first, world.second = 0.0, 0.0, 0.0, 0.0
@@ -61,11 +63,11 @@ def step(world, settings, place, first, second, rewards):
     if settings.wheel_actions:
         left, right = first * settings.max_wheel_speed, second * settings.max_wheel_speed
     else:
-        v, half = first * settings.max_speed, 0.5 * settings.track_width * (second * settings.max_yaw_rate)
-        left, right = v - half, v + half
+        v, omega = first * settings.max_speed, second * settings.max_yaw_rate
+        left, right = wheel_speeds(v, omega, settings.track_width)
     advance_person(world, world.steps * settings.dt, settings.dt, settings.person_substeps)
     world.steps += 1
-    world.command_left, world.command_right = limit(
+    world.command_left, world.command_right = limited(
         left,
         right,
         world.command_left,
@@ -87,19 +89,16 @@ def step(world, settings, place, first, second, rewards):
         settings.substeps,
         settings.track_width,
     )
-    world.saturated = max(abs(world.command_left - left), abs(world.command_right - right)) > 1e-9
+    world.saturated = is_saturated(left, right, world.command_left, world.command_right)
     _look(world, settings, place)
     world.collision = _collision(world, settings, place)
-    effort = max(abs(first - world.first), abs(second - world.second))
+    effort = task.effort(first, second, world.first, world.second)
     world.first, world.second = float(np.float32(first)), float(np.float32(second))
-    distance_error, bearing_error = (world.distance - SET_POINT) / 0.5, world.bearing / 0.35
-    rewards[0] = 0.4 / (1.0 + distance_error * distance_error)
-    rewards[1] = 0.4 / (1.0 + bearing_error * bearing_error)
-    rewards[2] = 0.1 if world.visible else 0.0
-    rewards[3] = 0.1 * (1.0 - 0.5 * effort)
-    rewards[4] = -1.0 if world.collision > 0 else 0.0
-    terminated = world.collision > 0 or world.out_of_view * settings.dt > LOST_AFTER
-    return terminated, not terminated and world.steps * settings.dt >= world.duration - 1e-9
+    collided = world.collision > 0
+    terms = task.reward_terms(world.bearing, world.distance, world.visible, effort, collided)
+    for k in range(len(terms)):
+        rewards[k] = terms[k]
+    return task.ends(collided, world.out_of_view * settings.dt, world.steps * settings.dt, world.duration)
 
 
 @_jit
@@ -115,56 +114,35 @@ def _collision(world, settings, place):
 def _look(world, settings, place):
     """Update the truth and what is counted from it: `FollowEnv._look`."""
     world.cosine, world.sine = math.cos(world.yaw), math.sin(world.yaw)
-    dx, dy = world.person_x - world.x, world.person_y - world.y
-    world.distance = world.cosine * dx + world.sine * dy
-    left = -world.sine * dx + world.cosine * dy
-    world.bearing = math.atan2(left, world.distance)
-    world.surface_distance = max(math.sqrt(dx * dx + dy * dy) - settings.hull_radius - PERSON_RADIUS, 0.0)
-    world.visible = _in_view(world, settings, place, world.distance - settings.camera_forward, left)
+    x, y, cosine, sine = world.x, world.y, world.cosine, world.sine
+    person_x, person_y = world.person_x, world.person_y
+    world.bearing, world.distance, left = seen_from_robot(x, y, cosine, sine, person_x, person_y)
+    world.surface_distance = surface_distance(x, y, person_x, person_y, settings.hull_radius)
+    forward = settings.camera_forward
+    eye = x + forward * cosine, y + forward * sine, settings.camera_height
+    person, direction, depth = (person_x, person_y), (cosine, sine), world.distance - forward
+    world.visible = in_view(free_sight, place, eye, person, direction, depth, left, settings.half_view)
     world.out_of_view = 0 if world.visible else world.out_of_view + 1
     world.longest_out_of_view = max(world.longest_out_of_view, world.out_of_view)
-    if _LOW <= world.distance <= _HIGH and abs(world.bearing) <= BAND_BEARING:
-        world.in_band += 1
+    world.in_band += task.in_band(world.bearing, world.distance)
     if settings.pictures:
         t = world.steps * settings.dt
-        world.walked, world.speed = walked_at(world, t), speed_at(world, t)
+        world.walked, world.speed = walked_of(world, t), speed_of(world, t)
         high, low, _, _ = words(world, world.steps, 0, PICTURE)
         world.picture_seed = high << np.uint64(32) | low
-
-
-@_jit
-def _in_view(world, settings, place, depth, left):
-    """Whether the person's axis or either side of the trunk is in the camera's field with a free line of sight."""
-    if depth <= NEAREST_SEEN:
-        return False
-    reach = depth * settings.half_view
-    eye_x = world.x + settings.camera_forward * world.cosine
-    eye_y = world.y + settings.camera_forward * world.sine
-    for offset in (0.0, HALF_TRUNK, -HALF_TRUNK):
-        if abs(left + offset) <= reach:
-            x, y = world.person_x - offset * world.sine, world.person_y + offset * world.cosine
-            if free_sight(place, eye_x, eye_y, settings.camera_height, x, y, CHEST_HEIGHT):
-                return True
-    return False
 
 
 @_jit
 def measure(world, settings, draws):
     """Return (valid, bearing, distance) as measured with the six `draws` of a step: `MeasurementModel.measure`."""
     z_bearing, z_distance, renew, kind, size, miss = draws
-    if world.steps == 0:
-        world.bearing_error, world.distance_error = z_bearing, z_distance
-    else:
-        world.bearing_error = settings.bearing_keep * world.bearing_error + settings.bearing_fresh * z_bearing
-        world.distance_error = settings.distance_keep * world.distance_error + settings.distance_fresh * z_distance
-    if renew < settings.renew or world.steps == 0:
-        span = settings.outlier_high - settings.outlier_low
-        world.outlier = settings.outlier_low + span * size if kind < settings.outlier_share else 0.0
+    last = world.bearing_error, world.distance_error, world.outlier
+    errors = next_errors(settings, last, (z_bearing, z_distance, renew, kind, size), world.steps == 0)
+    world.bearing_error, world.distance_error, world.outlier = errors
     if not world.visible or miss < settings.miss_share:
         return False, 0.0, 0.0
-    bearing = world.bearing + settings.bearing_bias + settings.bearing_noise * world.bearing_error
-    distance = world.distance + settings.distance_bias + settings.distance_noise * world.distance_error
-    return True, bearing, max(distance + world.outlier, 0.0)
+    bearing, distance = measured(settings, world.bearing, world.distance, errors)
+    return True, bearing, distance
 
 
 @_jit
@@ -180,20 +158,19 @@ def draw(world, settings):
 
 
 @_jit
-def observe(world, settings, measured):
-    """Return the `state` or `measurement` observation, eight numbers; `measured` is (valid, bearing, distance)."""
+def observe(world, settings, seen):
+    """Return the `state` or `measurement` observation, eight numbers; `seen` is (valid, bearing, distance)."""
     own = world.v, world.omega, world.first, world.second
     if settings.observe_state:
-        vx, vy = world.person_vx, world.person_vy
-        ahead, left = world.cosine * vx + world.sine * vy, world.cosine * vy - world.sine * vx
-        return (world.bearing, world.distance, ahead, left, *own)
-    valid, bearing, distance = measured
+        velocity, direction = (world.person_vx, world.person_vy), (world.cosine, world.sine)
+        return state_values(world.bearing, world.distance, velocity, direction, own)
+    valid, bearing, distance = seen
     time = world.steps * settings.dt
     if not valid:
-        return (0.0, 0.0, 0.0, time - world.last_measured, *own)
+        return no_measurement_values(time - world.last_measured, own)
     age = settings.delay * settings.dt
     world.last_measured = time - age
-    return (min(max(bearing, -math.pi), math.pi), min(distance, MAX_DISTANCE), 1.0, age, *own)
+    return measurement_values(bearing, distance, age, own)
 
 
 @_jit
@@ -205,12 +182,8 @@ def report(world, settings, info):
     info.person_pose[0], info.person_pose[1], info.person_pose[2] = world.person_x, world.person_y, world.heading
     info.person_velocity[0], info.person_velocity[1] = world.person_vx, world.person_vy
     info.twist[0], info.twist[1] = world.v, world.omega
-    info.command[0] = 0.5 * (world.command_left + world.command_right)
-    info.command[1] = (world.command_right - world.command_left) / settings.track_width
+    info.command[0], info.command[1] = twist_of(world.command_left, world.command_right, settings.track_width)
     info.collision_with = world.collision
     info.visible, info.collision, info.saturated = world.visible, world.collision > 0, world.saturated
-    info.is_success = (
-        world.collision == 0
-        and world.longest_out_of_view * settings.dt <= SUCCESS_OUT_OF_VIEW + 1e-9
-        and world.in_band >= SUCCESS_BAND_SHARE * (world.steps + 1)
-    )
+    longest = world.longest_out_of_view * settings.dt
+    info.is_success = task.succeeds(world.collision > 0, longest, world.in_band, world.steps + 1)

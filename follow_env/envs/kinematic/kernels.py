@@ -6,9 +6,11 @@ from pathlib import Path
 
 from numba import njit
 
-from follow_env.compilation import digest
+from follow_env.compilation import compilable, digest
 from follow_env.envs.kinematic.episode import begin, draw, measure, observe, report, step
+from follow_env.envs.task import total
 
+compilable(total)
 SKIP, BEGIN, STEP = range(3)
 """What `play` does with a world."""
 
@@ -16,8 +18,10 @@ SKIP, BEGIN, STEP = range(3)
 def _sources() -> list[Path]:
     package = Path(__file__).parents[2]
     own = [path for path in Path(__file__).parent.glob("*.py") if path.stem not in ("render_worlds", "pictures")]
-    world = [*package.glob("world/kinematic/*.py"), package / "world/bullet.py", package / "world/motion/routes.py"]
-    return [*own, *world, *(package / f"envs/{name}.py" for name in ("follow", "observations", "task"))]
+    world = [*package.glob("world/kinematic/*.py"), *package.glob("world/motion/*.py"), package / "world/scene.py"]
+    parts = "world/clock", "world/people/dimensions", "world/robots/diff_drive", "camera/measurement"
+    envs = "envs/observations", "envs/task", "envs/truth"
+    return [*own, *world, *(package / f"{name}.py" for name in (*parts, *envs))]
 
 
 def _compiled(sources: int) -> Callable[..., int]:
@@ -57,7 +61,7 @@ def _compiled(sources: int) -> Callable[..., int]:
             else:
                 terms = info.rewards
                 ended[i], cut[i] = step(world, shared, place, actions[i, 0], actions[i, 1], terms)
-                rewards[i] = (((terms[0] + terms[1]) + terms[2]) + terms[3]) + terms[4]
+                rewards[i] = total(terms)
             if observations.shape[1] > 0:
                 measured = (False, 0.0, 0.0)
                 if shared.measure:

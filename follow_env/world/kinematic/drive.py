@@ -1,22 +1,13 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The robot's motion: limits, first-order wheels and exact arcs at the physics rate, without slip."""
+"""The robot's motion: first-order wheels and exact arcs at the physics rate, without slip."""
 
 import math
 
 from numba import njit
 
-from follow_env.world.bullet import PHYSICS_HZ
+from follow_env.world.clock import PHYSICS_HZ
 
 _jit = njit(nogil=True, error_model="numpy")
-
-
-@_jit
-def limit(left, right, last_left, last_right, max_speed, step):
-    """Return the rim-speed command after the wheels' limits: `DiffDrive.limit` with `step` = acceleration * dt."""
-    top = max(abs(left), abs(right))
-    if top > max_speed:
-        left, right = left * max_speed / top, right * max_speed / top
-    return min(max(left, last_left - step), last_left + step), min(max(right, last_right - step), last_right + step)
 
 
 @_jit

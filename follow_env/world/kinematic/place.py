@@ -6,13 +6,15 @@ way to the center at most, which settles nearly every question; the rest is comp
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from follow_env.world.bullet import PERSON_HEIGHT, PERSON_RADIUS
-from follow_env.world.scene import Box, Scene
+from follow_env.compilation import compilable
+from follow_env.world.people import dimensions
+from follow_env.world.scene import Box, Primitive, Scene, distances, footprints, gap
 
 CELL = 0.1
 """Size of the grid's cells, m."""
@@ -22,7 +24,8 @@ CHASSIS_MIDDLE, CHASSIS_LENGTH, CHASSIS_WIDTH = -0.05, 0.15, 0.11  # half sizes
 CHASSIS_LOW, CHASSIS_HIGH = 0.05, 0.15
 CASTER_MIDDLE, CASTER_RADIUS = -0.18, 0.03
 MAST_MIDDLE, MAST_RADIUS, MAST_LOW, MAST_HIGH = -0.07, 0.03, 0.16, 0.96
-PERSON_LOW = 0.5 * PERSON_HEIGHT - 0.5 * (PERSON_HEIGHT - 2.0 * PERSON_RADIUS - 0.02)
+PERSON_RADIUS = dimensions.RADIUS
+PERSON_LOW = 0.5 * dimensions.HEIGHT - 0.5 * dimensions.STRAIGHT
 """Height of the center of the lower half-sphere of the person's capsule, m."""
 FURTHEST = 0.24
 """All parts but the wheels lie in a circle of this radius around the axle's middle, m."""
@@ -50,8 +53,8 @@ class Place(NamedTuple):
 
 def pack_place(scene: Scene, camera_height: float, chest_height: float) -> Place:
     """Return the obstacles of `scene` for a camera at `camera_height` (m) that looks at `chest_height` (m)."""
-    rows = []
-    for p in scene.obstacles():
+    solid, rows = scene.obstacles(), []
+    for p in solid:
         if isinstance(p, Box):
             length, width, radius, yaw = 0.5 * p.size[0], 0.5 * p.size[1], 0.0, p.yaw
         else:
@@ -62,33 +65,30 @@ def pack_place(scene: Scene, camera_height: float, chest_height: float) -> Place
         rows.append((*footprint, p.bottom, 2.0 * z - p.bottom, reach))
     obstacles = np.array(rows, OBSTACLE)
     low, high = sorted((camera_height, chest_height))
-    sight = obstacles[(obstacles["low"] <= high) & (obstacles["high"] >= low)]
-    x_min, x_max, y_min, y_max = scene.bounds
-    columns, rows_ = math.ceil((x_max - x_min) / CELL), math.ceil((y_max - y_min) / CELL)
-    grids = [_grid(group, x_min, y_min, columns, rows_) for group in (obstacles, sight)]
-    return Place(obstacles, sight, grids[0], grids[1], x_min, y_min)
+    between = (obstacles["low"] <= high) & (obstacles["high"] >= low)
+    in_sight = [solid[k] for k in np.flatnonzero(between)]
+    grids = _grid(scene.bounds, solid), _grid(scene.bounds, in_sight)
+    return Place(obstacles, obstacles[between], *grids, scene.bounds[0], scene.bounds[2])
 
 
+def _grid(bounds: tuple[float, float, float, float], obstacles: Sequence[Primitive]) -> np.ndarray:
+    """Return the distance from the middle of each cell to the next obstacle, (columns, rows), m."""
+    x0, x1, y0, y1 = bounds
+    cells = np.empty((math.ceil((x1 - x0) / CELL), math.ceil((y1 - y0) / CELL)))
+    x, y = (start + (np.arange(count) + 0.5) * CELL for start, count in zip((x0, y0), cells.shape, strict=True))
+    table = footprints(obstacles)
+    for i, column in enumerate(cells):
+        column[:] = distances(np.column_stack((np.full(len(y), x[i]), y)), table)
+    return cells
+
+
+compilable(gap)
 _jit = njit(nogil=True, error_model="numpy", forceinline=True)
 
 
 @_jit
-def gap(obstacle, x, y):
-    """Return the horizontal distance from a point to an obstacle, m; 0 inside."""
-    dx, dy = x - obstacle.x, y - obstacle.y
-    along = max(abs(dx * obstacle.cosine + dy * obstacle.sine) - obstacle.length, 0.0)
-    across = max(abs(dy * obstacle.cosine - dx * obstacle.sine) - obstacle.width, 0.0)
-    return max(math.sqrt(along * along + across * across) - obstacle.radius, 0.0)
-
-
-@njit(cache=True, nogil=True)
-def _grid(obstacles, x0, y0, columns, rows):
-    distance = np.full((columns, rows), np.inf)
-    for i in range(columns):
-        for j in range(rows):
-            for k in range(len(obstacles)):
-                distance[i, j] = min(distance[i, j], gap(obstacles[k], x0 + (i + 0.5) * CELL, y0 + (j + 0.5) * CELL))
-    return distance
+def _gap(o, x, y):
+    return gap(x - o.x, y - o.y, o.length, o.width, o.cosine, o.sine, o.radius)
 
 
 @_jit
@@ -108,7 +108,7 @@ def nearer_than(place, x, y, radius):
     if least >= radius or most < radius:
         return most < radius
     for k in range(len(place.obstacles)):  # noqa: SIM110  numba inlines no generators
-        if gap(place.obstacles[k], x, y) < radius:
+        if _gap(place.obstacles[k], x, y) < radius:
             return True
     return False
 
@@ -125,12 +125,12 @@ def touches_place(place, x, y, cosine, sine, wheel_radius, half_track):
         if dx * dx + dy * dy > (o.reach + furthest) ** 2:
             continue
         for side in (-half_track, half_track):
-            if gap(o, x - side * sine, y + side * cosine) < _ball(wheel_radius, o.low, o.high):
+            if _gap(o, x - side * sine, y + side * cosine) < _ball(wheel_radius, o.low, o.high):
                 return True
-        if gap(o, x + CASTER_MIDDLE * cosine, y + CASTER_MIDDLE * sine) < _ball(CASTER_RADIUS, o.low, o.high):
+        if _gap(o, x + CASTER_MIDDLE * cosine, y + CASTER_MIDDLE * sine) < _ball(CASTER_RADIUS, o.low, o.high):
             return True
         beside_mast = o.low < MAST_HIGH and o.high > MAST_LOW
-        if beside_mast and gap(o, x + MAST_MIDDLE * cosine, y + MAST_MIDDLE * sine) < MAST_RADIUS:
+        if beside_mast and _gap(o, x + MAST_MIDDLE * cosine, y + MAST_MIDDLE * sine) < MAST_RADIUS:
             return True
         if o.low < CHASSIS_HIGH and o.high > CHASSIS_LOW and _chassis_overlaps(o, x, y, cosine, sine):
             return True
@@ -185,9 +185,10 @@ def touches_person(x, y, cosine, sine, person_x, person_y, wheel_radius, half_tr
 
 
 @_jit
-def free_sight(place, x, y, z, to_x, to_y, to_z):
-    """Whether no obstacle meets the straight line between two points."""
-    dx, dy, dz = to_x - x, to_y - y, to_z - z
+def free_sight(place, eye, point):
+    """Whether no obstacle meets the straight line between two points (x, y, z)."""
+    x, y, z = eye
+    dx, dy, dz = point[0] - x, point[1] - y, point[2] - z
     length = math.sqrt(dx * dx + dy * dy)
     if _bounds(place.sight_distance, place, x + 0.5 * dx, y + 0.5 * dy)[0] > 0.5 * length:
         return True

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from follow_env.camera.measurement import ErrorModel
 from follow_env.world.motion.routes import PAPER_SPEED, ROUTES
 
 if TYPE_CHECKING:
@@ -73,9 +74,7 @@ SETTINGS = np.dtype(
         *_reals("dt", "decay", "stretch", "start_x", "start_y", "start_yaw", "start_width"),
         *_reals("track_width", "wheel_radius", "max_speed", "max_yaw_rate", "max_wheel_speed"),
         *_reals("max_wheel_acceleration", "camera_forward", "camera_height", "hull_radius", "half_view"),
-        *_reals("bearing_bias", "bearing_noise", "bearing_keep", "bearing_fresh"),
-        *_reals("distance_bias", "distance_noise", "distance_keep", "distance_fresh"),
-        *_reals("renew", "outlier_share", "outlier_low", "outlier_high", "miss_share"),
+        *_reals(*ErrorModel._fields),
     ],
     align=True,
 )
@@ -85,12 +84,7 @@ SETTINGS = np.dtype(
 def pack_settings(env: "FollowEnv") -> np.ndarray:
     """Return the settings of `env`, (1,) `SETTINGS`."""
     packed = np.zeros(1, SETTINGS)
-    robot, measurement, start = env.robot_config, env._sensor.measurement, env.scene.start
-    run = measurement.outlier_duration_s * (1.0 - measurement.outlier_share)
-    keep = [
-        math.exp(-env.dt / tau) if tau > 0.0 else 0.0
-        for tau in (measurement.bearing_correlation_s, measurement.distance_correlation_s)
-    ]
+    robot, start = env.robot_config, env.scene.start
     values = {
         "observe_state": env._obs == "state",
         "measure": env._obs == "measurement",
@@ -106,12 +100,8 @@ def pack_settings(env: "FollowEnv") -> np.ndarray:
         **dict(zip(("start_x", "start_y", "start_yaw"), start, strict=True)),
         "start_width": env.scene.start_width,
         "half_view": math.tan(0.5 * env.camera.hfov),
-        "bearing_keep": keep[0],
-        "bearing_fresh": math.sqrt(1.0 - keep[0] * keep[0]),
-        "distance_keep": keep[1],
-        "distance_fresh": math.sqrt(1.0 - keep[1] * keep[1]),
-        "renew": env.dt / run if run > env.dt else 1.0,
+        **ErrorModel.of(env._sensor.measurement, env.dt)._asdict(),
     }
     for name in SETTINGS.names or ():
-        packed[name] = values[name] if name in values else getattr(robot, name, getattr(measurement, name, None))
+        packed[name] = values[name] if name in values else getattr(robot, name)
     return packed

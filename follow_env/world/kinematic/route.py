@@ -5,18 +5,32 @@ import math
 
 from numba import njit
 
+from follow_env.compilation import compilable
 from follow_env.world.kinematic.philox import ROUTE, START, uniforms
 from follow_env.world.kinematic.place import nearer_than
 from follow_env.world.kinematic.records import MOST_TURNS, ROUTE_NUMBERS
-from follow_env.world.motion.routes import CLEARANCE, CORNER_CUT, LARGEST_TURN, TABLE_STEP
+from follow_env.world.motion.profile import speed_at, turned_at, walked_at
+from follow_env.world.motion.routes import (
+    ATTEMPTS,
+    CLEARANCE,
+    CORNER_CUT,
+    EARLIEST_TURN,
+    LARGEST_TURN,
+    LATEST_TURN,
+    OUTLINE_STEP,
+    PAPER_DISTANCE,
+    PAPER_DURATION,
+    PAPER_RAMP,
+    QUICKEST_TURN,
+    SLOWEST_TURN,
+    SMALLEST_TURN,
+    TABLE_STEP,
+)
 
-DISTANCE, DURATION, RAMP = 12.0, 14.0, 1.0
-"""Of the paper's routes: m, s and s."""
-ATTEMPTS = 1000
 _PAPER, _STANDING = ROUTE_NUMBERS["paper"], ROUTE_NUMBERS["standing"]
-_SHORTEST_TURN = math.radians(20.0)
 _UNKNOWN = -1.0  # a speed like no other: speeds are not negative
 
+compilable(speed_at, turned_at, walked_at)
 _jit = njit(nogil=True, error_model="numpy", forceinline=True)
 
 
@@ -27,13 +41,13 @@ def draw_route(world, place, stretch):
     All its times are those of the paper by `stretch`: `Route.at_speed`.
     """
     world.turns = 0
-    world.duration, world.ramp = DURATION, RAMP
+    world.duration, world.ramp = PAPER_DURATION, PAPER_RAMP
     if world.route == _STANDING:
         world.distance_total = 0.0
         return True
-    world.distance_total = DISTANCE
+    world.distance_total = PAPER_DISTANCE
     fits = world.route != _PAPER or _draw_paper_route(world, place)
-    world.duration, world.ramp = stretch * DURATION, stretch * RAMP
+    world.duration, world.ramp = stretch * PAPER_DURATION, stretch * PAPER_RAMP
     for k in range(world.turns):
         world.turn_start[k], world.turn_duration[k] = stretch * world.turn_start[k], stretch * world.turn_duration[k]
     return fits
@@ -55,10 +69,10 @@ def _draw_turns(world, attempt):
     """Draw the turns in the order of time: `routes._draw_turns`."""
     for k in range(world.turns):
         begin, angle, sign, duration = uniforms(world, attempt, k, ROUTE)
-        world.turn_start[k] = 1.5 + 10.5 * begin
-        size = _SHORTEST_TURN + (LARGEST_TURN - _SHORTEST_TURN) * angle
+        world.turn_start[k] = EARLIEST_TURN + (LATEST_TURN - EARLIEST_TURN) * begin
+        size = SMALLEST_TURN + (LARGEST_TURN - SMALLEST_TURN) * angle
         world.turn_angle[k] = size if sign < 0.5 else -size
-        world.turn_duration[k] = 0.8 + 0.8 * duration
+        world.turn_duration[k] = QUICKEST_TURN + (SLOWEST_TURN - QUICKEST_TURN) * duration
     if world.turns == MOST_TURNS and world.turn_start[1] < world.turn_start[0]:
         world.turn_start[0], world.turn_start[1] = world.turn_start[1], world.turn_start[0]
 
@@ -75,14 +89,14 @@ def _outline_is_free(world, place):
     x, y, heading = world.person_x, world.person_y, world.route_heading
     along, walked, turned = 0.0, 0.0, 0.0
     for k in range(world.turns + 1):
-        corner = DISTANCE
+        corner = PAPER_DISTANCE
         if k < world.turns:
-            corner = DISTANCE * (world.turn_start[k] + 0.5 * world.turn_duration[k]) / DURATION
+            corner = PAPER_DISTANCE * (world.turn_start[k] + 0.5 * world.turn_duration[k]) / PAPER_DURATION
         cosine, sine = math.cos(heading + turned), math.sin(heading + turned)
-        while along <= min(corner, DISTANCE - 0.2):
+        while along <= min(corner, PAPER_DISTANCE - 0.5 * OUTLINE_STEP):
             if nearer_than(place, x + (along - walked) * cosine, y + (along - walked) * sine, CLEARANCE - CORNER_CUT):
                 return False
-            along += 0.4
+            along += OUTLINE_STEP
         x, y = x + (corner - walked) * cosine, y + (corner - walked) * sine
         walked = corner
         if k < world.turns:
@@ -95,7 +109,7 @@ def _path_is_free(world, place):
     """Whether every third point of the route's table keeps the clearance."""
     x, y = world.person_x, world.person_y
     motion = _motion(world, 0.0, (0.0, 0.0, _UNKNOWN, 0.0))
-    for i in range(math.ceil(DURATION / TABLE_STEP) + 1):
+    for i in range(math.ceil(PAPER_DURATION / TABLE_STEP) + 1):
         if i % 3 == 0 and nearer_than(place, x, y, CLEARANCE):
             return False
         x, y, motion = _walk(world, x, y, motion, i * TABLE_STEP, TABLE_STEP)
@@ -114,7 +128,7 @@ def advance_person(world, t, dt, substeps):
         x, y, motion = _walk(world, x, y, motion, t + k * h, h)
     world.person_x, world.person_y = x, y
     world.person_vx, world.person_vy, _, _ = motion
-    world.heading = heading_at(world, t + dt)
+    world.heading = heading_of(world, t + dt)
 
 
 @_jit
@@ -141,7 +155,7 @@ def _walk(world, x, y, motion, t, h):
 @_jit
 def _motion(world, t, last):
     """Return velocity (2), speed and heading at time t; the `last` again if speed and heading are still the same."""
-    speed, heading = speed_at(world, t), heading_at(world, t)
+    speed, heading = speed_of(world, t), heading_of(world, t)
     if speed == last[2] and heading == last[3]:
         return last
     return speed * math.cos(heading), speed * math.sin(heading), speed, heading
@@ -155,38 +169,26 @@ def velocity(world, t):
 
 
 @_jit
-def speed_at(world, t):
-    """Return the walking speed at time t, m/s: `Route.speed`."""
-    edge = min(t, world.duration - t)
-    if edge <= 0.0:
-        return 0.0
-    cruise = world.distance_total / (world.duration - world.ramp)
-    if edge >= world.ramp:
-        return cruise
-    return cruise * 0.5 * (1.0 - math.cos(math.pi * edge / world.ramp))
+def speed_of(world, t):
+    """Return the walking speed at time t, m/s."""
+    return speed_at(t, _cruise(world), world.duration, world.ramp)
 
 
 @_jit
-def walked_at(world, t):
-    """Return the distance walked until time t, m: `Route.walked`."""
-    t = min(max(t, 0.0), world.duration)
-    edge = min(t, world.duration - t)
-    cruise = world.distance_total / (world.duration - world.ramp)
-    if edge >= world.ramp:
-        way = cruise * (edge - 0.5 * world.ramp)
-    else:
-        way = cruise * 0.5 * (edge - world.ramp / math.pi * math.sin(math.pi * edge / world.ramp))
-    return way if edge == t else world.distance_total - way
+def walked_of(world, t):
+    """Return the distance walked until time t, m."""
+    return walked_at(t, world.distance_total, _cruise(world), world.duration, world.ramp)
 
 
 @_jit
-def heading_at(world, t):
+def _cruise(world):
+    return world.distance_total / (world.duration - world.ramp)
+
+
+@_jit
+def heading_of(world, t):
     """Return the heading at time t, rad: `Route.heading`."""
     heading = world.route_heading
     for k in range(world.turns):
-        share = (t - world.turn_start[k]) / world.turn_duration[k]
-        if share >= 1.0:
-            heading += world.turn_angle[k]
-        elif share > 0.0:
-            heading += world.turn_angle[k] * 0.5 * (1.0 - math.cos(math.pi * share))
+        heading += turned_at(t, world.turn_start[k], world.turn_duration[k], world.turn_angle[k])
     return heading

@@ -16,6 +16,7 @@ import numpy as np
 
 from follow_env.envs.task import SET_POINT
 from follow_env.registry import choose
+from follow_env.world.motion.profile import speed_at, turned_at, walked_at
 from follow_env.world.scene import Scene
 
 TABLE_STEP = 0.1
@@ -30,13 +31,28 @@ CORNER_CUT = 0.15
 SMALLEST_TURN, LARGEST_TURN = math.radians(20.0), math.radians(50.0)
 """Paper B's limits on a turn; the larger one also on the heading against the start, rad."""
 
+EARLIEST_TURN, LATEST_TURN = 1.5, 12.0
+"""Between these a turn of the paper's routes begins, s."""
+
+QUICKEST_TURN, SLOWEST_TURN = 0.8, 1.6
+"""Between these it lasts, s."""
+
+PAPER_DISTANCE, PAPER_DURATION, PAPER_RAMP = 12.0, 14.0, 1.0
+"""Paper B's routes: m, s and s."""
+
+ATTEMPTS = 1000
+"""So many candidates are drawn before a scene counts as too narrow."""
+
+OUTLINE_STEP = 0.4
+"""An outline is sampled this often, m of the way."""
+
 PAPER_SPEED = 12.0 / 13.0
 """Walking speed of paper B's routes between starting and stopping, m/s: 12 m in 14 s with ramps of 1 s."""
 
 SLOWEST, FASTEST = 0.2, 2.0
 """Walking speeds that a route can have, m/s: a shuffle and a jog."""
 
-OUTLINE = np.arange(0.0, 12.0, 0.4)
+OUTLINE = np.arange(0.0, PAPER_DISTANCE, OUTLINE_STEP)
 """Where an outline is sampled, m of the way."""
 
 
@@ -50,10 +66,7 @@ class Turn:
 
     def turned(self, t: float) -> float:
         """Return by how much the heading has changed at time t, rad."""
-        share = (t - self.start) / self.duration
-        if share <= 0.0:
-            return 0.0
-        return self.angle if share >= 1.0 else self.angle * 0.5 * (1.0 - math.cos(math.pi * share))
+        return turned_at(t, self.start, self.duration, self.angle)
 
 
 class Route:
@@ -70,9 +83,9 @@ class Route:
     def __init__(
         self,
         start: tuple[float, float, float],
-        distance: float = 12.0,
-        duration: float = 14.0,
-        ramp: float = 1.0,
+        distance: float = PAPER_DISTANCE,
+        duration: float = PAPER_DURATION,
+        ramp: float = PAPER_RAMP,
         turns: tuple[Turn, ...] = (),
     ) -> None:
         if not (distance >= 0.0 and duration >= 2.0 * ramp > 0.0):
@@ -87,16 +100,11 @@ class Route:
 
     def speed(self, t: float) -> float:
         """Walking speed at time t, m/s."""
-        return _speed(t, self._cruise, self.duration, self._ramp)
+        return speed_at(t, self._cruise, self.duration, self._ramp)
 
     def walked(self, t: float) -> float:
         """Distance walked until time t, m."""
-        t = min(max(t, 0.0), self.duration)
-        if t > self.duration / 2.0:
-            return self.distance - self.walked(self.duration - t)
-        if t >= self._ramp:
-            return self._cruise * (t - 0.5 * self._ramp)
-        return self._cruise * 0.5 * (t - self._ramp / math.pi * math.sin(math.pi * t / self._ramp))
+        return walked_at(t, self.distance, self._cruise, self.duration, self._ramp)
 
     def heading(self, t: float) -> float:
         """Heading at time t, rad, ccw from the world's x axis."""
@@ -156,15 +164,6 @@ class Route:
         return positions.T, list(zip(*positions.tolist(), *velocities[:, ::2].tolist(), strict=True))
 
 
-def _speed(t: float, cruise: float, duration: float, ramp: float) -> float:
-    edge = min(t, duration - t)
-    if edge <= 0.0:
-        return 0.0
-    if edge >= ramp:
-        return cruise
-    return cruise * 0.5 * (1.0 - math.cos(math.pi * edge / ramp))
-
-
 @lru_cache(maxsize=64)
 def _speeds(cruise: float, duration: float, ramp: float) -> tuple[tuple[float, ...], np.ndarray]:
     """Return the times of the table and of the middles between its rows, in order, and the speeds then."""
@@ -172,7 +171,7 @@ def _speeds(cruise: float, duration: float, ramp: float) -> tuple[tuple[float, .
     for i in range(math.ceil(duration / TABLE_STEP)):
         t = i * TABLE_STEP
         times += [t + 0.5 * TABLE_STEP, t + TABLE_STEP]
-    return tuple(times), np.array([_speed(t, cruise, duration, ramp) for t in times])
+    return tuple(times), np.array([speed_at(t, cruise, duration, ramp) for t in times])
 
 
 def paper_route(scene: Scene, start: tuple[float, float, float], rng: np.random.Generator) -> Route:
@@ -182,7 +181,7 @@ def paper_route(scene: Scene, start: tuple[float, float, float], rng: np.random.
     turn, half have two. Candidates that pass nearer than `CLEARANCE` to an obstacle are drawn again.
     """
     count = int(rng.integers(1, 3))
-    for _ in range(1000):
+    for _ in range(ATTEMPTS):
         turns = _draw_turns(count, rng)
         outline = _outline(start, turns)
         if outline is None or not scene.is_clear(outline, CLEARANCE - CORNER_CUT):
@@ -194,11 +193,11 @@ def paper_route(scene: Scene, start: tuple[float, float, float], rng: np.random.
 
 
 def _draw_turns(count: int, rng: np.random.Generator) -> tuple[Turn, ...]:
-    """Draw `count` turns, in the order of time, within 1.5-12 s."""
-    begins = sorted(rng.uniform(1.5, 12.0, count).tolist())
+    """Draw `count` turns, in the order of time."""
+    begins = sorted(rng.uniform(EARLIEST_TURN, LATEST_TURN, count).tolist())
     sizes = rng.uniform(SMALLEST_TURN, LARGEST_TURN, count).tolist()
     right = rng.integers(0, 2, count).tolist()
-    durations = rng.uniform(0.8, 1.6, count).tolist()
+    durations = rng.uniform(QUICKEST_TURN, SLOWEST_TURN, count).tolist()
     return tuple(Turn(begins[k], durations[k], -sizes[k] if right[k] else sizes[k]) for k in range(count))
 
 
@@ -215,8 +214,8 @@ def _outline(start: tuple[float, float, float], turns: tuple[Turn, ...]) -> np.n
         last_end = turn.start + turn.duration
     x, y, heading = start
     along, xs, ys, turned = [0.0], [x], [y], 0.0
-    for turn in (*turns, Turn(14.0, 0.0, 0.0)):
-        length = 12.0 * (turn.start + 0.5 * turn.duration) / 14.0 - along[-1]
+    for turn in (*turns, Turn(PAPER_DURATION, 0.0, 0.0)):
+        length = PAPER_DISTANCE * (turn.start + 0.5 * turn.duration) / PAPER_DURATION - along[-1]
         x, y = x + length * math.cos(heading + turned), y + length * math.sin(heading + turned)
         along.append(along[-1] + length)
         xs.append(x)
@@ -246,7 +245,7 @@ ROUTES: dict[str, Callable[[Scene, tuple[float, float, float], np.random.Generat
 def choose_route(name: str, scene: Scene) -> str:
     """Return the name of a route; a ValueError names the nearest, or says that the scene is too short for it."""
     choose("route", name, ROUTES)
-    if name != "standing" and scene.clearance(Route(scene.start, SET_POINT + 12.0).points()) < CLEARANCE:
+    if name != "standing" and scene.clearance(Route(scene.start, SET_POINT + PAPER_DISTANCE).points()) < CLEARANCE:
         raise ValueError(
             f"the route {name!r} needs 12 m of free way, which the scene {scene.name!r} lacks; take route='standing' "
             "or another scene"

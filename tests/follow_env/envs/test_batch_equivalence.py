@@ -19,7 +19,7 @@ from follow_env.world.scenes import make_scene
 
 BAD_SENSOR = {"measurement": {"outlier_share": 0.2, "miss_share": 0.1}}
 touches = njit(lambda *pose: touches_place(*pose))
-sees = njit(lambda *line: free_sight(*line))
+sees = njit(lambda place, eye, point: free_sight(place, eye, point))
 SCENE = pytest.mark.parametrize("scene", IDS)
 
 
@@ -120,7 +120,7 @@ def test_touch_and_sight_are_those_of_pybullet(scene):
         world.reset(far, (80.0, 80.0, 0.0))
         wanted = world.line_of_sight(eye, point)
         hidden += not wanted
-        agree.append(sees(place, *eye, *point) == wanted)
+        agree.append(sees(place, eye, point) == wanted)
     assert np.mean(agree) > 0.99
     assert min(touched, hidden) > 80
     world.close()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from follow_env.config import RobotConfig
-from follow_env.world.bullet import PHYSICS_HZ, World
+from follow_env.world.bullet import World
+from follow_env.world.clock import PHYSICS_HZ
 from follow_env.world.robots.diff_drive import DiffDrive, advance
 from follow_env.world.scene import Material, Scene
 

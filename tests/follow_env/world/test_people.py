@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from follow_env.world.bullet import PERSON_HEIGHT, PERSON_RADIUS
+from follow_env.world.people import dimensions
 from follow_env.world.people.bodies import ASSETS, BODIES, DETAILS, MATERIALS, OUTFITS, Outfit, load_body
 from follow_env.world.people.stride import FOOT, HAND, HEAD, LEFT, RIGHT, SHIN, THIGH
 from follow_env.world.people.walker import POSTURES, Walker
@@ -114,7 +114,7 @@ def test_standing_height_is_the_stated_one(name: str):
 
 
 def test_the_default_person_is_as_tall_as_the_collision_body():
-    assert load_body().height == pytest.approx(PERSON_HEIGHT, abs=0.03)
+    assert load_body().height == pytest.approx(dimensions.HEIGHT, abs=0.03)
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.25, 0.92, 1.15])
@@ -125,7 +125,7 @@ def test_the_visible_body_is_where_the_collision_body_is(walkers, speed: float):
         for k in range(48):
             vertices = walker.place(2.0, -1.0, 0.8, walker.stride * k / 48, speed).vertices
             away = np.hypot(vertices[:, 0] - 2.0, vertices[:, 1] + 1.0)
-            assert away[trunk].max() < PERSON_RADIUS, (name, k)
+            assert away[trunk].max() < dimensions.RADIUS, (name, k)
             assert away.max() < 0.65, (name, k)
             assert vertices[middle, :2].mean(axis=0) == pytest.approx((2.0, -1.0), abs=0.05), (name, k)
 

@@ -15,15 +15,15 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from follow_env.compilation import announced
-from follow_env.config import RobotConfig
 from follow_env.envs.follow import FollowEnv, _pose
 from follow_env.envs.kinematic.kernels import BEGIN, SKIP, STEP, play
 from follow_env.envs.kinematic.pictures import Pictures
 from follow_env.envs.task import REWARD_TERMS, SET_POINT
 from follow_env.registry import choose
 from follow_env.world.kinematic.philox import keys
-from follow_env.world.kinematic.place import pack_place
-from follow_env.world.kinematic.records import COLLISIONS, INFO, MOST_TURNS, ROUTE_NUMBERS, WORLD, pack_settings
+from follow_env.world.kinematic.place import COLLISIONS, pack_place
+from follow_env.world.kinematic.records import INFO, MOST_TURNS, ROUTE_NUMBERS, WORLD, pack_settings
+from follow_env.world.kinematic.world import check_torque
 from follow_env.world.motion.routes import Route, choose_route, make_route
 from follow_env.world.people.dimensions import CHEST_HEIGHT
 
@@ -306,9 +306,7 @@ def _check_batchable(single: FollowEnv) -> None:
         raise ValueError(f"renderer {single._renderer_name!r} draws one world only; expected 'raster' in a batch")
     if single.render_mode is not None:
         raise ValueError(f"render_mode is {single.render_mode!r}; expected None in a batch: watch a FollowEnv instead")
-    torque = single.robot_config.max_wheel_torque
-    if torque != RobotConfig().max_wheel_torque:
-        raise ValueError(f"robot max_wheel_torque is {torque!r}, but the kinematic batch knows no torque; leave it out")
+    check_torque(single.robot_config)
 
 
 def _entropy(seed: int) -> np.uint64:

@@ -14,7 +14,7 @@ from follow_env.envs.task import SET_POINT
 from follow_env.envs.truth import in_view, seen_from_robot, surface_distance
 from follow_env.world.kinematic.drive import roll
 from follow_env.world.kinematic.philox import NOISE, OUTLIER, PICTURE, START, normals, uniforms, words
-from follow_env.world.kinematic.place import free_sight, touches_person, touches_place
+from follow_env.world.kinematic.place import free_sight, touched
 from follow_env.world.kinematic.route import advance_person, draw_route, heading_of, speed_of, velocity, walked_of
 from follow_env.world.robots.diff_drive import is_saturated, limited, twist_of, wheel_speeds
 
@@ -91,7 +91,8 @@ def step(world, settings, place, first, second, rewards):
     )
     world.saturated = is_saturated(left, right, world.command_left, world.command_right)
     _look(world, settings, place)
-    world.collision = _collision(world, settings, place)
+    robot, person = (world.x, world.y, world.cosine, world.sine), (world.person_x, world.person_y)
+    world.collision = touched(place, *robot, *person, settings.wheel_radius, 0.5 * settings.track_width)
     effort = task.effort(first, second, world.first, world.second)
     world.first, world.second = float(np.float32(first)), float(np.float32(second))
     collided = world.collision > 0
@@ -99,15 +100,6 @@ def step(world, settings, place, first, second, rewards):
     for k in range(len(terms)):
         rewards[k] = terms[k]
     return task.ends(collided, world.out_of_view * settings.dt, world.steps * settings.dt, world.duration)
-
-
-@_jit
-def _collision(world, settings, place):
-    half_track, wheel = 0.5 * settings.track_width, settings.wheel_radius
-    x, y, cosine, sine = world.x, world.y, world.cosine, world.sine
-    if touches_person(x, y, cosine, sine, world.person_x, world.person_y, wheel, half_track):
-        return 2
-    return 1 if touches_place(place, x, y, cosine, sine, wheel, half_track) else 0
 
 
 @_jit

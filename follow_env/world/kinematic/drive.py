@@ -10,6 +10,11 @@ from follow_env.world.clock import PHYSICS_HZ
 _jit = njit(nogil=True, error_model="numpy")
 
 
+def kept_speed_error(dt: float, substeps: int, tau: float) -> float:
+    """Return the share of a wheel's speed error that is left after one of `substeps` physics steps in dt (s)."""
+    return math.exp(-dt / substeps / tau)
+
+
 @_jit
 def roll(x, y, yaw, cosine, sine, left, right, command_left, command_right, decay, substeps, track):
     """Drive for `substeps` physics steps; return pose, rim speeds and the mean twist (what encoders give).

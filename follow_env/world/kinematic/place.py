@@ -27,6 +27,8 @@ MAST_MIDDLE, MAST_RADIUS, MAST_LOW, MAST_HIGH = -0.07, 0.03, 0.16, 0.96
 PERSON_RADIUS = dimensions.RADIUS
 PERSON_LOW = 0.5 * dimensions.HEIGHT - 0.5 * dimensions.STRAIGHT
 """Height of the center of the lower half-sphere of the person's capsule, m."""
+COLLISIONS = ("none", "wall", "person")
+"""What a robot touches, by the number that `touched` returns."""
 FURTHEST = 0.24
 """All parts but the wheels lie in a circle of this radius around the axle's middle, m."""
 
@@ -182,6 +184,14 @@ def touches_person(x, y, cosine, sine, person_x, person_y, wheel_radius, half_tr
     rise = PERSON_LOW - CHASSIS_HIGH
     beyond = max(abs(along - CHASSIS_MIDDLE) - CHASSIS_LENGTH, 0.0), max(abs(across) - CHASSIS_WIDTH, 0.0)
     return beyond[0] ** 2 + beyond[1] ** 2 + rise * rise < PERSON_RADIUS * PERSON_RADIUS
+
+
+@_jit
+def touched(place, x, y, cosine, sine, person_x, person_y, wheel_radius, half_track):
+    """Return what the level robot touches: 0 = nothing, 1 = an obstacle, 2 = the person."""
+    if touches_person(x, y, cosine, sine, person_x, person_y, wheel_radius, half_track):
+        return 2
+    return 1 if touches_place(place, x, y, cosine, sine, wheel_radius, half_track) else 0
 
 
 @_jit

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from follow_env.camera.measurement import ErrorModel
+from follow_env.world.kinematic.drive import kept_speed_error
 from follow_env.world.motion.routes import PAPER_SPEED, ROUTES
 
 if TYPE_CHECKING:
@@ -15,8 +16,6 @@ MOST_TURNS = 2
 """Turns that a world's route can have."""
 PERSON_STEP = 1.0 / 30.0
 """The person's path is integrated (Simpson) in steps of at most this, s."""
-COLLISIONS = ("none", "wall", "person")
-"""What a robot touches, by the number in a world's record."""
 ROUTE_NUMBERS = {name: number for number, name in enumerate(ROUTES)}
 """Route name -> its number in a world's record."""
 
@@ -95,7 +94,7 @@ def pack_settings(env: "FollowEnv") -> np.ndarray:
         "person_substeps": max(math.ceil(env.dt / PERSON_STEP - 1e-9), 1),
         "delay": env._delay,
         "dt": env.dt,
-        "decay": math.exp(-env.dt / env._substeps / robot.wheel_time_constant),
+        "decay": kept_speed_error(env.dt, env._substeps, robot.wheel_time_constant),
         "stretch": PAPER_SPEED / env._walking_speed,
         **dict(zip(("start_x", "start_y", "start_yaw"), start, strict=True)),
         "start_width": env.scene.start_width,

@@ -22,7 +22,7 @@ from follow_env.envs.task import REWARD_TERMS, SET_POINT
 from follow_env.registry import choose
 from follow_env.world.kinematic.philox import keys
 from follow_env.world.kinematic.place import COLLISIONS, pack_place
-from follow_env.world.kinematic.records import INFO, MOST_TURNS, ROUTE_NUMBERS, WORLD, pack_settings
+from follow_env.world.kinematic.records import INFO, ROUTE_NUMBERS, TABLE_COLUMNS, WORLD, pack_settings
 from follow_env.world.kinematic.world import check_torque
 from follow_env.world.motion.routes import Route, choose_route, make_route
 from follow_env.world.people.dimensions import CHEST_HEIGHT
@@ -82,6 +82,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         self._worlds = np.zeros(num_envs, WORLD)
         self._queues = np.zeros((num_envs, single._delay, 3))
         self._tapes = np.zeros((1, 1, 6))
+        self._tables = np.zeros((1, 1, len(TABLE_COLUMNS)))
         self._observations = np.zeros((num_envs, 0 if self._settings["pictures"][0] else 8), np.float32)
         self._done = np.zeros(num_envs, bool)
         self._started = False
@@ -127,20 +128,23 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         """
         if len(seeds) != self.num_envs:
             raise ValueError(f"{len(seeds)} seeds for {self.num_envs} worlds; expected one for each world")
-        single, tapes = self._single, []
+        single, tapes, tables = self._single, [], []
         for i, seed in enumerate(seeds):
             rng, _ = seeding.np_random(seed)
             x, y, yaw = single.scene.start
             y += float(rng.uniform(-1.0, 1.0)) * single.scene.start_width
             ahead = (x + SET_POINT * math.cos(yaw), y + SET_POINT * math.sin(yaw), yaw)
             route = make_route(single._route_name, single.scene, ahead, rng, single._walking_speed)
-            self._give(i, (x, y, yaw), route)
             steps = math.ceil(route.duration / single.dt) + 1
-            tapes.append([[*rng.standard_normal(1), *rng.standard_normal(1), *rng.random(4)] for _ in range(steps)])
-        self._tapes = np.array(tapes)
+            tables.append(_table(route, steps, single.dt))
+            world = self._worlds[i]
+            world["x"], world["y"], world["yaw"] = x, y, yaw
+            world["duration"], world["rows"] = route.duration, steps
+            tapes.append([[*rng.standard_normal(2), *rng.random(4)] for _ in range(steps)])
+        self._tapes, self._tables = np.array(tapes), np.array(tables)
         everyone = np.ones(self.num_envs, bool)
         self._seed(seeds, everyone)
-        self._worlds["given_route"] = True
+        self._worlds["given_start"] = True
         return self._begin(everyone)
 
     def step(self, actions: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
@@ -220,7 +224,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         return [jobs[0](), *(other.result() for other in others)]
 
     def _play(self, first: int, last: int, todo: np.ndarray, actions: np.ndarray, *outcome: np.ndarray) -> int:
-        given = (todo, self._worlds, self._queues, self._tapes, self._settings, self._place, actions)
+        given = (todo, self._worlds, self._queues, self._tapes, self._tables, self._settings, self._place, actions)
         return play(first, last, *given, *outcome)
 
     def _mask(self, mask: Any) -> np.ndarray:
@@ -263,22 +267,6 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
             world["x"], world["y"], world["yaw"] = _pose(poses[i])
             world["given_pose"] = True
 
-    def _give(self, i: int, robot_pose: tuple[float, float, float], route: Route) -> None:
-        """Write the start of an episode into the record of world i."""
-        if len(route.turns) > MOST_TURNS:
-            raise ValueError(f"the route has {len(route.turns)} turns; a batch takes up to {MOST_TURNS}")
-        world = self._worlds[i]
-        world["x"], world["y"], world["yaw"] = robot_pose
-        world["person_x"], world["person_y"], world["route_heading"] = route.start
-        world["distance_total"], world["duration"], world["ramp"] = route.distance, route.duration, route._ramp
-        world["turns"] = len(route.turns)
-        for k, turn in enumerate(route.turns):
-            world["turn_start"][k], world["turn_duration"][k], world["turn_angle"][k] = (
-                turn.start,
-                turn.duration,
-                turn.angle,
-            )
-
     def _finals(self, observation: Any, info: dict[str, Any]) -> dict[str, Any]:
         """Return `final_obs` and `final_info` of the worlds that are done, as Gymnasium's `SAME_STEP` wants them."""
         last = np.full(self.num_envs, None, object)
@@ -293,6 +281,12 @@ def _shares(count: int, parts: int) -> list[tuple[int, int]]:
     """Return the ends of `parts` ranges that cover 0 <= i < count."""
     edges = [count * k // parts for k in range(parts + 1)]
     return list(pairwise(edges))
+
+
+def _table(route: Route, rows: int, dt: float) -> np.ndarray:
+    """Return a route's `TABLE_COLUMNS` at times 0, dt, ..., (rows, 5)."""
+    times = [k * dt for k in range(rows)]
+    return np.array([(*route.pose(t), route.speed(t), route.walked(t)) for t in times])
 
 
 def _check_batchable(single: FollowEnv) -> None:

@@ -5,9 +5,8 @@ World frame: x along the scene's main direction, y left, z up, floor at z = 0, m
 
 import functools
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,6 +14,10 @@ CELL = 0.2
 """Side of the cells of a scene's table of clearances, m."""
 CELL_REACH = 0.15
 """The clearance differs by less than this within half a cell's diagonal, m."""
+
+
+FOOTPRINT = np.dtype([(name, np.float64) for name in ("x", "y", "length", "width", "cosine", "sine", "radius")])
+"""An obstacle seen from above: a rectangle (middle, half sizes, yaw) grown by a radius, m."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +161,7 @@ class Scene:
 
         Round obstacles count with their full radius; without obstacles the clearance is infinite.
         """
-        return float(distances(points, self._footprints).min())
+        return float(self._distances(points).min(initial=math.inf))
 
     def is_clear(self, points: np.ndarray, least: float) -> bool:
         """Whether `clearance(points) >= least` (m); a table decides about most of the points (n, 2)."""
@@ -170,6 +173,11 @@ class Scene:
         undecided = ~(about > least + CELL_REACH)
         return not undecided.any() or self.clearance(points[undecided]) >= least
 
+    def _distances(self, points: np.ndarray) -> np.ndarray:
+        from follow_env.world.clearance import distances  # compiled: only for those who ask
+
+        return distances(points, self._footprints)
+
     @functools.cached_property
     def _table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Clearance at the middle of each cell, framed by cells that say NaN: unknown; its corner and last indices."""
@@ -178,12 +186,12 @@ class Scene:
         table = np.full((math.ceil((x1 - x0) / CELL) + 2, math.ceil((y1 - y0) / CELL) + 2), np.nan)
         middles = origin + CELL * (np.moveaxis(np.indices(table.shape), 0, -1) + 0.5)
         for column, points in zip(table[1:-1, 1:-1], middles[1:-1, 1:-1], strict=True):
-            column[:] = distances(points, self._footprints)
+            column[:] = self._distances(points)
         return table, origin, np.array(table.shape) - 1.0
 
     @functools.cached_property
     def _footprints(self) -> np.ndarray:
-        return footprints(self.obstacles())
+        return np.array(sorted({footprint(p) for p in self.obstacles()}), FOOTPRINT)
 
     def illumination(self, x: float, y: float) -> float:
         """Relative brightness at the floor point (x, y): lamps with inverse-square falloff, about 1 under a lamp."""
@@ -194,43 +202,12 @@ class Scene:
         return total
 
 
-def footprints(obstacles: Iterable[Primitive]) -> np.ndarray:
-    """Return obstacles as seen from above, each once, (n, 7): the arguments of `gap` behind the point's, x and y first.
-
-    Columns: x, y, half length, half width, cosine and sine of the yaw, radius; m.
-    """
-    rows = {
-        (*p.center[:2], 0.5 * p.size[0], 0.5 * p.size[1], math.cos(p.yaw), math.sin(p.yaw), 0.0)
-        if isinstance(p, Box)
-        else (*p.center[:2], 0.0, 0.0, 1.0, 0.0, p.radius)
-        for p in obstacles
-    }
-    return np.array(sorted(rows)).reshape(-1, 7)
-
-
-def gap(dx: Any, dy: Any, length: Any, width: Any, cosine: Any, sine: Any, radius: Any) -> Any:
-    """Return the horizontal distance from a point to a rectangle (half sizes) grown by `radius`, m; 0 inside.
-
-    Args:
-        dx: from the rectangle's middle to the point along x, m; like all arguments a number, or an array that
-            broadcasts.
-        dy: along y, m.
-        length: half size along the rectangle's own x axis, m.
-        width: half size along its y axis, m.
-        cosine: of the rectangle's yaw.
-        sine: of the rectangle's yaw.
-        radius: m.
-    """
-    along = np.maximum(np.abs(dx * cosine + dy * sine) - length, 0.0)
-    across = np.maximum(np.abs(dy * cosine - dx * sine) - width, 0.0)
-    return np.maximum(np.sqrt(along * along + across * across) - radius, 0.0)
-
-
-def distances(points: np.ndarray, obstacles: np.ndarray) -> np.ndarray:
-    """Return how far each of the points (n, 2) is from the next of the footprints (m, 7), m; infinite without any."""
-    offset = points[:, None, :] - obstacles[:, :2]
-    least: np.ndarray = gap(offset[..., 0], offset[..., 1], *obstacles[:, 2:].T).min(axis=1, initial=math.inf)
-    return least
+def footprint(p: Primitive) -> tuple[float, float, float, float, float, float, float]:
+    """Return a primitive as seen from above: the numbers of a `FOOTPRINT`."""
+    x, y, _ = p.center
+    if isinstance(p, Box):
+        return x, y, 0.5 * p.size[0], 0.5 * p.size[1], math.cos(p.yaw), math.sin(p.yaw), 0.0
+    return x, y, 0.0, 0.0, 1.0, 0.0, p.radius
 
 
 def _check(primitive: Primitive, place: tuple[float, ...], lengths: tuple[float, ...]) -> None:

@@ -15,7 +15,13 @@ from follow_env.envs.truth import in_view, seen_from_robot, surface_distance
 from follow_env.world.kinematic.drive import roll
 from follow_env.world.kinematic.philox import NOISE, OUTLIER, PICTURE, START, normals, uniforms, words
 from follow_env.world.kinematic.place import free_sight, touched
-from follow_env.world.kinematic.route import advance_person, draw_route, heading_of, speed_of, velocity, walked_of
+from follow_env.world.kinematic.route import (
+    advance_person,
+    draw_route,
+    speed_of,
+    start_person,
+    walked_of,
+)
 from follow_env.world.robots.diff_drive import is_saturated, limited, twist_of, wheel_speeds
 
 compilable(gauss_markov, measured, next_errors)
@@ -27,27 +33,26 @@ _jit = njit(nogil=True, error_model="numpy", forceinline=True)
 
 
 @_jit
-def begin(world, settings, place):
-    """Start the world's next episode; False if no route fits.
+def begin(world, settings, place, tables, i):
+    """Start the next episode of world i; False if no route fits.
 
-    `given_pose`: the robot's pose stands in the record already. `given_route`: start pose, route and error draws do.
+    What is there already: with `given_pose` the robot's pose; with `given_start` that, the person's motion in `tables`
+    and the draws of the measurement's errors; with the setting `by_table` the motion.
     """
     world.episode += 1
     world.steps = 0
-    world.taped = world.given_route
+    world.taped, world.by_table = world.given_start, world.given_start or settings.by_table
     fits = True
-    if not world.given_route:
-        cosine, sine = math.cos(settings.start_yaw), math.sin(settings.start_yaw)
-        x = settings.start_x
-        y = settings.start_y + (2.0 * uniforms(world, 0, 0, START)[0] - 1.0) * settings.start_width
+    if not world.given_start:
+        x, y, yaw = start_of(world, settings)
         if not world.given_pose:
-            world.x, world.y, world.yaw = x, y, settings.start_yaw
-        world.person_x, world.person_y = x + SET_POINT * cosine, y + SET_POINT * sine
-        world.route_heading = settings.start_yaw
-        fits = draw_route(world, place, settings.stretch)
-    world.given_pose, world.given_route, world.route = False, False, settings.route
-    world.heading = heading_of(world, 0.0)
-    world.person_vx, world.person_vy = velocity(world, 0.0)
+            world.x, world.y, world.yaw = x, y, yaw
+        if not world.by_table:
+            world.person_x, world.person_y = x + SET_POINT * math.cos(yaw), y + SET_POINT * math.sin(yaw)
+            world.route_heading = yaw
+            fits = draw_route(world, place, settings.stretch)
+    start_person(world, tables, i)
+    world.given_pose, world.given_start, world.route = False, False, settings.route
     world.left, world.right, world.command_left, world.command_right = 0.0, 0.0, 0.0, 0.0
     world.v, world.omega, world.first, world.second = 0.0, 0.0, 0.0, 0.0
     world.out_of_view, world.longest_out_of_view, world.in_band, world.collision = 0, 0, 0, 0
@@ -57,15 +62,22 @@ def begin(world, settings, place):
 
 
 @_jit
-def step(world, settings, place, first, second, rewards):
-    """Drive for one control period; write the rewards' terms, return (terminated, truncated)."""
+def start_of(world, settings):
+    """Return where the robot starts (x, y, yaw): somewhere across the scene's start."""
+    y = settings.start_y + (2.0 * uniforms(world, 0, 0, START)[0] - 1.0) * settings.start_width
+    return settings.start_x, y, settings.start_yaw
+
+
+@_jit
+def step(world, settings, place, tables, i, first, second, rewards):
+    """Drive world i for one control period; write the rewards' terms, return (terminated, truncated)."""
     first, second = min(max(first, -1.0), 1.0), min(max(second, -1.0), 1.0)
     if settings.wheel_actions:
         left, right = first * settings.max_wheel_speed, second * settings.max_wheel_speed
     else:
         v, omega = first * settings.max_speed, second * settings.max_yaw_rate
         left, right = wheel_speeds(v, omega, settings.track_width)
-    advance_person(world, world.steps * settings.dt, settings.dt, settings.person_substeps)
+    advance_person(world, tables, i, settings.dt, settings.person_substeps)
     world.steps += 1
     world.command_left, world.command_right = limited(
         left,
@@ -118,8 +130,9 @@ def _look(world, settings, place):
     world.longest_out_of_view = max(world.longest_out_of_view, world.out_of_view)
     world.in_band += task.in_band(world.bearing, world.distance)
     if settings.pictures:
-        t = world.steps * settings.dt
-        world.walked, world.speed = walked_of(world, t), speed_of(world, t)
+        if not world.by_table:
+            t = world.steps * settings.dt
+            world.walked, world.speed = walked_of(world, t), speed_of(world, t)
         high, low, _, _ = words(world, world.steps, 0, PICTURE)
         world.picture_seed = high << np.uint64(32) | low
 

@@ -18,7 +18,7 @@ SKIP, BEGIN, STEP = range(3)
 def _sources() -> list[Path]:
     package = Path(__file__).parents[2]
     own = [path for path in Path(__file__).parent.glob("*.py") if path.stem not in ("render_worlds", "pictures")]
-    world = [*package.glob("world/kinematic/*.py"), *package.glob("world/motion/*.py"), package / "world/scene.py"]
+    world = [*package.glob("world/kinematic/*.py"), *package.glob("world/motion/*.py"), package / "world/clearance.py"]
     parts = "world/clock", "world/people/dimensions", "world/robots/diff_drive", "camera/measurement"
     envs = "envs/observations", "envs/task", "envs/truth"
     return [*own, *world, *(package / f"{name}.py" for name in (*parts, *envs))]
@@ -27,7 +27,21 @@ def _sources() -> list[Path]:
 def _compiled(sources: int) -> Callable[..., int]:
     @njit(cache=True, nogil=True, error_model="numpy")
     def play(
-        first, last, todo, worlds, queues, tapes, settings, place, actions, observations, infos, rewards, ended, cut
+        first,
+        last,
+        todo,
+        worlds,
+        queues,
+        tapes,
+        tables,
+        settings,
+        place,
+        actions,
+        observations,
+        infos,
+        rewards,
+        ended,
+        cut,
     ):
         """Begin or step the worlds first <= i < last; return how many found no route.
 
@@ -38,7 +52,8 @@ def _compiled(sources: int) -> Callable[..., int]:
             worlds: (n,) `records.WORLD`.
             queues: (n, delay, 3) float64, delayed measurements.
             tapes: (n, steps, 6) float64, given draws of the measurement's errors; read for the worlds that are `taped`.
-            settings: (1,) `records.SETTINGS`.
+            tables: (n, rows, 5) float64, motions: `records.TABLE_COLUMNS`; read for the worlds that are `by_table`.
+            settings: (1,) `records.SETTINGS`, or (n,) if each world has its own.
             place: `Place`.
             actions: (n, 2) float64.
             observations: (n, 8) float32, out; (n, 0) if pictures are observed.
@@ -48,31 +63,30 @@ def _compiled(sources: int) -> Callable[..., int]:
             cut: (n,) bool, truncated, out where a world steps.
         """
         key = sources  # noqa: F841  captured, hence part of the cache key
-        shared = settings[0]
-        failures = 0
+        failures, own = 0, 1 if len(settings) > 1 else 0
         for i in range(first, last):
             if todo[i] == SKIP:
                 continue
-            world, info = worlds[i], infos[i]
+            world, info, setting = worlds[i], infos[i], settings[own * i]
             if todo[i] == BEGIN:
-                if not begin(world, shared, place):
+                if not begin(world, setting, place, tables, i):
                     failures += 1
                 info.rewards[:] = 0.0
             else:
                 terms = info.rewards
-                ended[i], cut[i] = step(world, shared, place, actions[i, 0], actions[i, 1], terms)
+                ended[i], cut[i] = step(world, setting, place, tables, i, actions[i, 0], actions[i, 1], terms)
                 rewards[i] = total(terms)
             if observations.shape[1] > 0:
                 measured = (False, 0.0, 0.0)
-                if shared.measure:
-                    draws = _taped(tapes, i, world.steps) if world.taped else draw(world, shared)
-                    measured = measure(world, shared, draws)
-                    if shared.delay > 0:
+                if setting.measure:
+                    draws = _taped(tapes, i, world.steps) if world.taped else draw(world, setting)
+                    measured = measure(world, setting, draws)
+                    if setting.delay > 0:
                         measured = _delayed(queues, i, world.steps, measured)
-                observation = observe(world, shared, measured)
+                observation = observe(world, setting, measured)
                 for k in range(8):
                     observations[i, k] = observation[k]
-            report(world, shared, info)
+            report(world, setting, info)
         return failures
 
     return play

@@ -6,15 +6,14 @@ way to the center at most, which settles nearly every question; the rest is comp
 """
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from follow_env.compilation import compilable
+from follow_env.world.clearance import distances, gap
 from follow_env.world.people import dimensions
-from follow_env.world.scene import Box, Primitive, Scene, distances, footprints, gap
+from follow_env.world.scene import FOOTPRINT, Scene, footprint
 
 CELL = 0.1
 """Size of the grid's cells, m."""
@@ -32,11 +31,8 @@ COLLISIONS = ("none", "wall", "person")
 FURTHEST = 0.24
 """All parts but the wheels lie in a circle of this radius around the axle's middle, m."""
 
-OBSTACLE = np.dtype(
-    [(name, np.float64) for name in ("x", "y", "length", "width", "cosine", "sine", "radius")]
-    + [(name, np.float64) for name in ("low", "high", "reach")]
-)
-"""An upright prism: a rectangle (half sizes) grown by `radius`, between two heights, within `reach` of (x, y); m."""
+OBSTACLE = np.dtype(FOOTPRINT.descr + [(name, "<f8") for name in ("low", "high", "reach")])
+"""An upright prism: a footprint between two heights, within `reach` of (x, y); m."""
 
 
 class Place(NamedTuple):
@@ -55,42 +51,30 @@ class Place(NamedTuple):
 
 def pack_place(scene: Scene, camera_height: float, chest_height: float) -> Place:
     """Return the obstacles of `scene` for a camera at `camera_height` (m) that looks at `chest_height` (m)."""
-    solid, rows = scene.obstacles(), []
-    for p in solid:
-        if isinstance(p, Box):
-            length, width, radius, yaw = 0.5 * p.size[0], 0.5 * p.size[1], 0.0, p.yaw
-        else:
-            length, width, radius, yaw = 0.0, 0.0, p.radius, 0.0
+    rows = []
+    for p in scene.obstacles():
+        seen = footprint(p)
+        _, _, length, width, _, _, radius = seen
         reach = math.sqrt(length * length + width * width) + radius
-        x, y, z = p.center
-        footprint = (x, y, length, width, math.cos(yaw), math.sin(yaw), radius)
-        rows.append((*footprint, p.bottom, 2.0 * z - p.bottom, reach))
+        rows.append((*seen, p.bottom, 2.0 * p.center[2] - p.bottom, reach))
     obstacles = np.array(rows, OBSTACLE)
     low, high = sorted((camera_height, chest_height))
-    between = (obstacles["low"] <= high) & (obstacles["high"] >= low)
-    in_sight = [solid[k] for k in np.flatnonzero(between)]
-    grids = _grid(scene.bounds, solid), _grid(scene.bounds, in_sight)
-    return Place(obstacles, obstacles[between], *grids, scene.bounds[0], scene.bounds[2])
+    sight = obstacles[(obstacles["low"] <= high) & (obstacles["high"] >= low)]
+    grids = _grid(scene.bounds, obstacles), _grid(scene.bounds, sight)
+    return Place(obstacles, sight, *grids, scene.bounds[0], scene.bounds[2])
 
 
-def _grid(bounds: tuple[float, float, float, float], obstacles: Sequence[Primitive]) -> np.ndarray:
+def _grid(bounds: tuple[float, float, float, float], obstacles: np.ndarray) -> np.ndarray:
     """Return the distance from the middle of each cell to the next obstacle, (columns, rows), m."""
     x0, x1, y0, y1 = bounds
     cells = np.empty((math.ceil((x1 - x0) / CELL), math.ceil((y1 - y0) / CELL)))
     x, y = (start + (np.arange(count) + 0.5) * CELL for start, count in zip((x0, y0), cells.shape, strict=True))
-    table = footprints(obstacles)
     for i, column in enumerate(cells):
-        column[:] = distances(np.column_stack((np.full(len(y), x[i]), y)), table)
+        column[:] = distances(np.column_stack((np.full(len(y), x[i]), y)), obstacles)
     return cells
 
 
-compilable(gap)
 _jit = njit(nogil=True, error_model="numpy", forceinline=True)
-
-
-@_jit
-def _gap(o, x, y):
-    return gap(x - o.x, y - o.y, o.length, o.width, o.cosine, o.sine, o.radius)
 
 
 @_jit
@@ -110,7 +94,7 @@ def nearer_than(place, x, y, radius):
     if least >= radius or most < radius:
         return most < radius
     for k in range(len(place.obstacles)):  # noqa: SIM110  numba inlines no generators
-        if _gap(place.obstacles[k], x, y) < radius:
+        if gap(place.obstacles[k], x, y) < radius:
             return True
     return False
 
@@ -127,12 +111,12 @@ def touches_place(place, x, y, cosine, sine, wheel_radius, half_track):
         if dx * dx + dy * dy > (o.reach + furthest) ** 2:
             continue
         for side in (-half_track, half_track):
-            if _gap(o, x - side * sine, y + side * cosine) < _ball(wheel_radius, o.low, o.high):
+            if gap(o, x - side * sine, y + side * cosine) < _ball(wheel_radius, o.low, o.high):
                 return True
-        if _gap(o, x + CASTER_MIDDLE * cosine, y + CASTER_MIDDLE * sine) < _ball(CASTER_RADIUS, o.low, o.high):
+        if gap(o, x + CASTER_MIDDLE * cosine, y + CASTER_MIDDLE * sine) < _ball(CASTER_RADIUS, o.low, o.high):
             return True
         beside_mast = o.low < MAST_HIGH and o.high > MAST_LOW
-        if beside_mast and _gap(o, x + MAST_MIDDLE * cosine, y + MAST_MIDDLE * sine) < MAST_RADIUS:
+        if beside_mast and gap(o, x + MAST_MIDDLE * cosine, y + MAST_MIDDLE * sine) < MAST_RADIUS:
             return True
         if o.low < CHASSIS_HIGH and o.high > CHASSIS_LOW and _chassis_overlaps(o, x, y, cosine, sine):
             return True

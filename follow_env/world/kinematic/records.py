@@ -28,7 +28,7 @@ WORLD = np.dtype(
     [
         ("key", np.uint64),  # of the world's random numbers
         ("picture_seed", np.uint64),  # of the errors of this moment's picture
-        *((name, np.int64) for name in ("episode", "steps", "route", "turns", "collision")),
+        *((name, np.int64) for name in ("episode", "steps", "route", "turns", "rows", "collision")),
         *((name, np.int64) for name in ("out_of_view", "longest_out_of_view", "in_band")),
         *_reals("x", "y", "yaw", "cosine", "sine"),  # robot
         *_reals("left", "right", "command_left", "command_right"),  # rim speeds, m/s
@@ -41,7 +41,7 @@ WORLD = np.dtype(
         *_reals("bearing", "distance", "surface_distance"),
         *_reals("bearing_error", "distance_error", "outlier", "last_measured"),
         *((name, np.bool_) for name in ("visible", "saturated")),
-        *((name, np.bool_) for name in ("given_pose", "given_route", "taped")),  # see `episode.begin`
+        *((name, np.bool_) for name in ("given_pose", "given_start", "by_table", "taped")),  # see `episode.begin`
     ],
     align=True,
 )
@@ -63,12 +63,16 @@ INFO = np.dtype(
 )
 """What `info` says of one world, `rewards` in the order of `follow_env.envs.task.reward_terms`."""
 
+TABLE_COLUMNS = ("x", "y", "heading", "speed", "walked")
+"""Of a motion's table, one row each control step: m, m, rad, m/s and m."""
+
 SETTINGS = np.dtype(
     [
         ("observe_state", np.bool_),
         ("measure", np.bool_),
         ("pictures", np.bool_),
         ("wheel_actions", np.bool_),
+        ("by_table", np.bool_),
         *((name, np.int64) for name in ("route", "substeps", "person_substeps", "delay")),
         *_reals("dt", "decay", "stretch", "start_x", "start_y", "start_yaw", "start_width"),
         *_reals("track_width", "wheel_radius", "max_speed", "max_yaw_rate", "max_wheel_speed"),
@@ -89,6 +93,7 @@ def pack_settings(env: "FollowEnv") -> np.ndarray:
         "measure": env._obs == "measurement",
         "pictures": env._obs.startswith("rgbd"),
         "wheel_actions": env._action == "wheels",
+        "by_table": False,
         "route": ROUTE_NUMBERS[env._route_name],
         "substeps": env._substeps,
         "person_substeps": max(math.ceil(env.dt / PERSON_STEP - 1e-9), 1),

@@ -117,11 +117,35 @@ def _path_is_free(world, place):
 
 
 @_jit
-def advance_person(world, t, dt, substeps):
-    """Move the person from time t to t + dt: position, heading and velocity."""
+def start_person(world, tables, i):
+    """Put the person of world i where its motion begins."""
+    if world.by_table:
+        world.ramp = math.inf  # never steady
+        follow_table(world, tables, i, 0)
+    else:
+        world.heading = heading_of(world, 0.0)
+        world.person_vx, world.person_vy = velocity(world, 0.0)
+
+
+@njit(nogil=True, error_model="numpy")
+def follow_table(world, tables, i, step):
+    """Put the person of world i where the motion's table has it at a step; after the last row, at the last row."""
+    k = min(step, world.rows - 1)
+    world.person_x, world.person_y, world.heading = tables[i, k, 0], tables[i, k, 1], tables[i, k, 2]
+    world.speed, world.walked = tables[i, k, 3], tables[i, k, 4]
+    world.person_vx, world.person_vy = world.speed * math.cos(world.heading), world.speed * math.sin(world.heading)
+
+
+@_jit
+def advance_person(world, tables, i, dt, substeps):
+    """Move the person of world i on by dt: position, heading and velocity."""
+    t = world.steps * dt
     x, y, vx, vy = world.person_x, world.person_y, world.person_vx, world.person_vy
     if _steady(world, t, t + dt):
         world.person_x, world.person_y = x + dt * vx, y + dt * vy
+        return
+    if world.by_table:
+        follow_table(world, tables, i, world.steps + 1)
         return
     h, motion = dt / substeps, (vx, vy, _UNKNOWN, 0.0)
     for k in range(substeps):

@@ -137,7 +137,12 @@ def _compiled(sources: int) -> tuple[Callable[..., Any], ...]:
 
 def _sources() -> list[Path]:
     world = Path(__file__).parents[1]
-    return [*Path(__file__).parent.glob("*.py"), world / "scene.py", world / "clock.py", world / "people/dimensions.py"]
+    return [
+        *Path(__file__).parent.glob("*.py"),
+        world / "clearance.py",
+        world / "clock.py",
+        world / "people/dimensions.py",
+    ]
 
 
 _rolled, _touches, _sees = _compiled(digest(_sources()))

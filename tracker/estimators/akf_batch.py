@@ -1,20 +1,25 @@
-"""`BatchFilter`: paper B's adaptive Kalman filter over a batch of worlds, in arrays."""
+# mypy: disable-error-code="no-untyped-def"
+"""`BatchFilter`: paper B's adaptive Kalman filter over a batch of worlds, compiled."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
+from numba import njit
 
-from tracker.estimators import chi2_quantile
+from follow_env.compilation import compilable, digest
 from tracker.estimators.base import NoiseModel
+from tracker.estimators.two_axis import chi2_quantile, corrected, innovation_test
 
 
 class BatchFilter:
     """Turns `measurement` observations (n, 8) into estimates of the same layout.
 
     Bearing and distance become the filter's, validity says whether there is an estimate yet; the rest stays. The
-    arithmetic is that of `tracker.estimators.AdaptiveKalmanFilter` (eqs. (15)-(23)), all worlds at once.
+    arithmetic is that of `tracker.estimators.AdaptiveKalmanFilter` (eqs. (15)-(23)), to the bit.
 
     Args:
         worlds: how many.
@@ -53,28 +58,47 @@ class BatchFilter:
         self._started[:] = False
 
     def _update(self, observations: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        values = observations.astype(np.float64)
-        mean, variance, started = self._mean[worlds], self._variance[worlds], self._started[worlds]
-        mean = _wrapped(np.stack((mean[:, 0] - values[:, 5] * self._dt, mean[:, 1] - values[:, 4] * self._dt), axis=1))
-        variance = variance + self._q
-        innovation = _wrapped(values[:, :2] - mean)
-        squared = innovation * innovation
-        expected = np.maximum(variance + self._r, squared / self._chi2)
-        gain = variance / expected
-        measured = values[:, 2] > 0.0
-        corrected = (measured & started)[:, None]
-        first = (measured & ~started)[:, None]
-        mean = np.where(first, values[:, :2], np.where(corrected, _wrapped(mean + gain * innovation), mean))
-        variance = np.where(first, self._r, np.where(corrected, (1.0 - gain) * variance, variance))
-        self._mean[worlds], self._variance[worlds] = mean, variance
-        self._started[worlds] = started = started | measured
         result = observations.copy()
-        result[:, :2] = np.where(started[:, None], mean, 0.0)
-        result[:, 2] = started
+        noise = self._q, self._r, self._chi2
+        update(result, worlds, self._mean, self._variance, self._started, self._dt, *noise)
         return result
 
 
-def _wrapped(pairs: np.ndarray) -> np.ndarray:
-    """Return (bearing, distance) pairs (n, 2) with the bearing in [-pi, pi]."""
-    pairs[:, 0] -= math.tau * np.rint(pairs[:, 0] / math.tau)
-    return pairs
+def _compiled(sources: int) -> Callable[..., None]:
+    @njit(cache=True, error_model="numpy")
+    def update(observations, worlds, means, variances, started, dt, q, r, chi2):
+        """Replace the measurements (n, 8) of these worlds (n,) by their filters' estimates."""
+        key = sources  # noqa: F841  captured, hence part of the cache key
+        for k, i in enumerate(worlds):
+            seen = observations[k]
+            mean, variance = means[i], variances[i]
+            measured = float(seen[0]), float(seen[1])
+            if started[i]:
+                for axis, rate in enumerate((-float(seen[5]), -float(seen[4]))):
+                    mean[axis] += rate * dt
+                    variance[axis] += q[axis]
+                mean[0] = wrapped(mean[0])
+                if seen[2] > 0.0:
+                    for axis, innovation in enumerate((wrapped(measured[0] - mean[0]), measured[1] - mean[1])):
+                        _, _, expected = innovation_test(innovation, variance[axis], r[axis], chi2)
+                        mean[axis], variance[axis] = corrected(mean[axis], variance[axis], innovation, expected)
+                    mean[0] = wrapped(mean[0])
+            elif seen[2] > 0.0:
+                started[i] = True
+                mean[0], mean[1] = measured
+                variance[:] = r
+            known = started[i]
+            seen[0], seen[1] = (mean[0], mean[1]) if known else (0.0, 0.0)
+            seen[2] = 1.0 if known else 0.0
+
+    return update
+
+
+@njit(error_model="numpy")
+def wrapped(angle):
+    """Return the angle in [-pi, pi]: `math.remainder(angle, tau)`, which within three half turns is exact as well."""
+    return angle - math.tau * np.rint(angle / math.tau)
+
+
+compilable(corrected, innovation_test)
+update = _compiled(digest([Path(__file__).with_name("two_axis.py")]))

@@ -107,6 +107,30 @@ def chi2_quantile(alpha: float) -> float:
     return NormalDist().inv_cdf(alpha / 2.0) ** 2
 
 
+def innovation_test(innovation: float, variance: float, r: float, chi2: float) -> tuple[float, float, float]:
+    """Return (NIS, lambda, innovation variance to use) by eqs. (4), (15), (16), (20).
+
+    Args:
+        innovation: measured less predicted.
+        variance: of the prediction.
+        r: of the measurement.
+        chi2: a NIS above it inflates R by lambda.
+    """
+    innovation_variance = variance + r
+    squared = innovation * innovation
+    nis = squared / innovation_variance
+    if nis > chi2:
+        innovation_variance = squared / chi2
+        return nis, (innovation_variance - variance) / r, innovation_variance
+    return nis, 1.0, innovation_variance
+
+
+def corrected(value: float, variance: float, innovation: float, innovation_variance: float) -> tuple[float, float]:
+    """Return value and variance after an innovation, eqs. (21)-(23)."""
+    gain = variance / innovation_variance  # (21)
+    return value + gain * innovation, variance - gain * variance  # (22), (23), where K P̄ee = P⁻
+
+
 class Axis:
     """Scalar filter of one axis, a random walk with known input; q, r and p0 are its Q, R and P(0|0)."""
 
@@ -133,19 +157,11 @@ class Axis:
     def correct(self, innovation: float) -> tuple[float, float]:
         """Apply an innovation; return (NIS, lambda)."""
         nis, inflation, innovation_variance = self._test(innovation)
-        gain = self.variance / innovation_variance  # (21)
-        self.value += gain * innovation  # (22)
-        self.variance -= gain * self.variance  # (23), where K P̄ee = P⁻
+        self.value, self.variance = corrected(self.value, self.variance, innovation, innovation_variance)
         return nis, inflation
 
     def _test(self, innovation: float) -> tuple[float, float, float]:
-        """Return (NIS, lambda, innovation variance to use) by eqs. (4), (15), (16), (20)."""
-        innovation_variance = self.variance + self.r
-        squared = innovation * innovation
-        nis = squared / innovation_variance
-        inflation = 1.0
-        if nis > self.chi2:
-            innovation_variance = squared / self.chi2
-            inflation = (innovation_variance - self.variance) / self.r
-        self.history = (self.history << 1 | (inflation > 1.0)) & _WINDOW_MASK
-        return nis, inflation, innovation_variance
+        """Return what `innovation_test` does, and remember whether the measurement was inflated."""
+        result = innovation_test(innovation, self.variance, self.r, self.chi2)
+        self.history = (self.history << 1 | (result[1] > 1.0)) & _WINDOW_MASK
+        return result

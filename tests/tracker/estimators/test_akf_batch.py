@@ -44,6 +44,6 @@ def test_each_world_has_the_filter_of_one_robot() -> None:
             single[i] = AdaptiveKalmanFilter(NOISE.process, NOISE.measurement)
         wanted = np.stack([expected(i, fresh[i]) for i in range(worlds)])
         estimates, last_estimates = batch.step(fresh, ended, last)
-        np.testing.assert_allclose(estimates, wanted, atol=1e-6)
+        np.testing.assert_array_equal(estimates, wanted)
         if last is not None:
-            np.testing.assert_allclose(last_estimates, np.stack(wanted_last), atol=1e-6)
+            np.testing.assert_array_equal(last_estimates, np.stack(wanted_last))

@@ -10,24 +10,23 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium.utils import seeding
+from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
+from follow_env.camera.pinhole import PinholeCamera
 from follow_env.compilation import announced
-from follow_env.envs.follow import FollowEnv, _pose
+from follow_env.envs.kinematic.episodes import Episodes
 from follow_env.envs.kinematic.kernels import BEGIN, SKIP, STEP, play
 from follow_env.envs.kinematic.pictures import Pictures
-from follow_env.envs.task import REWARD_TERMS, SET_POINT
+from follow_env.envs.kinematic.records import INFO, WORLD
+from follow_env.envs.kinematic.standin import Domain, EnvConfig
+from follow_env.envs.observations import observation_space
+from follow_env.envs.task import REWARD_TERMS
 from follow_env.registry import choose
 from follow_env.world.kinematic.philox import keys
-from follow_env.world.kinematic.place import COLLISIONS, pack_place
-from follow_env.world.kinematic.records import INFO, ROUTE_NUMBERS, TABLE_COLUMNS, WORLD, pack_settings
-from follow_env.world.kinematic.world import check_torque
-from follow_env.world.motion.routes import Route, choose_route, make_route
-from follow_env.world.people.dimensions import CHEST_HEIGHT
+from follow_env.world.kinematic.place import COLLISIONS
 
-OBSERVATIONS = ("measurement", "state", "rgbd", "rgbd_uint8")
 WORLDS_PER_THREAD = 512
 """A thread is worth its while from this many worlds."""
 _LABELS = np.array(COLLISIONS, object)
@@ -46,11 +45,15 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
 
     Args:
         num_envs: number of worlds.
+        config: as in `FollowEnv`: an `EnvConfig`, a mapping, a `Domain` or None. Of a domain every world draws its own
+            settings in every episode; scene, observation, action, camera, renderer and control rate are the same in
+            all worlds.
         autoreset_mode: `AutoresetMode` or its value: `"NextStep"` (Gymnasium's default), `"SameStep"` (what
             Stable-Baselines3 does) or `"Disabled"`.
         threads: threads that share the worlds; by default one for each processor.
-        settings: those of `FollowEnv`. Not to be had in a batch: `obs="rgbd_box"`, `renderer="tiny"`, a `render_mode`,
-            the robot's `max_wheel_torque`.
+        settings: those of `FollowEnv`. A batch refuses `obs="rgbd_box"`, another renderer than `"raster"`, a
+            `render_mode`, `route="commanded"` and the robot's `max_wheel_torque`. A route other than `"paper"`,
+            `"straight"` and `"standing"` is drawn in Python, episode by episode, and walked from its table.
 
     Raises:
         ValueError: for an unknown name or an impossible value, in one sentence.
@@ -61,6 +64,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
     def __init__(
         self,
         num_envs: int = 1,
+        config: Any = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
         **settings: Any,
@@ -70,20 +74,21 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
                 raise ValueError(f"{what} is {value!r}; expected a whole number from 1")
         name = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
         mode = AutoresetMode(choose("autoreset_mode", name, [m.value for m in AutoresetMode]))
-        single = FollowEnv(**settings)
-        _check_batchable(single)
-        self.num_envs, self._mode, self._single = num_envs, mode, single
-        self.metadata = {**self.metadata, "render_fps": single.metadata["render_fps"], "autoreset_mode": mode}
-        self.single_action_space, self.single_observation_space = single.action_space, single.observation_space
-        self.action_space = batch_space(single.action_space, num_envs)
-        self.observation_space = batch_space(single.observation_space, num_envs)
-        self._settings = pack_settings(single)
-        self._place = pack_place(single.scene, single.robot_config.camera_height, CHEST_HEIGHT)
+        if (render_mode := settings.pop("render_mode", None)) is not None:
+            raise ValueError(f"render_mode is {render_mode!r}; expected None in a batch: watch a FollowEnv instead")
         self._worlds = np.zeros(num_envs, WORLD)
-        self._queues = np.zeros((num_envs, single._delay, 3))
-        self._tapes = np.zeros((1, 1, 6))
-        self._tables = np.zeros((1, 1, len(TABLE_COLUMNS)))
-        self._observations = np.zeros((num_envs, 0 if self._settings["pictures"][0] else 8), np.float32)
+        self._episodes = Episodes(Domain.of(config, **settings), self._worlds)
+        self.num_envs, self._mode = num_envs, mode
+        self.config = self._episodes.nominal
+        camera = PinholeCamera(self.config.camera)
+        self.metadata = {**self.metadata, "render_fps": self.config.control_hz, "autoreset_mode": mode}
+        self.single_action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self.single_observation_space = observation_space(self.config.obs, camera, self.config.robot)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._queues = np.zeros((num_envs, self._episodes.longest_delay, 3))
+        pictures = self.config.obs.startswith("rgbd")
+        self._observations = np.zeros((num_envs, 0 if pictures else 8), np.float32)
         self._done = np.zeros(num_envs, bool)
         self._started = False
         threads = threads or os.cpu_count() or 1
@@ -92,10 +97,15 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         parts = len(self._ranges)
         with announced("the worlds"):
             self._play(0, 0, np.zeros(num_envs, np.int8), np.zeros((num_envs, 2)), *self._outcome())
-            if self._settings["pictures"][0]:
+            if pictures:
                 parts = min(threads, num_envs)
-                self._pictures = Pictures(single, self._worlds, _shares(num_envs, parts))
+                self._pictures = Pictures(self._episodes, self._worlds, _shares(num_envs, parts))
         self._pool = ThreadPoolExecutor(parts - 1) if parts > 1 else None
+
+    @property
+    def configs(self) -> tuple[EnvConfig, ...]:
+        """The settings of the episode that each world plays."""
+        return tuple(self._episodes.configs)
 
     def reset(
         self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
@@ -104,7 +114,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
 
         Args:
             seed: a number, or one for each world; None goes on with the worlds' next episodes.
-            options: `reset_mask` ((num_envs,) bool: the worlds to start), `route` (name) and `robot_pose` ((x, y, yaw)
+            options: `reset_mask` ((num_envs,) bool: the worlds to start), `route` and `robot_pose` ((x, y, yaw)
                 or one for each world, (num_envs, 3); m and rad): for these episodes only.
         """
         options = dict(options or {})
@@ -113,7 +123,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         chosen = self._mask(options.get("reset_mask"))
         self._seed(seed, chosen)
         if "route" in options:
-            self._worlds["route"][chosen] = ROUTE_NUMBERS[choose_route(options["route"], self._single.scene)]
+            self._episodes.use_route(options["route"], chosen)
         if "robot_pose" in options:
             self._place_robots(options["robot_pose"], chosen)
         return self._begin(chosen)
@@ -128,24 +138,9 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         """
         if len(seeds) != self.num_envs:
             raise ValueError(f"{len(seeds)} seeds for {self.num_envs} worlds; expected one for each world")
-        single, tapes, tables = self._single, [], []
-        for i, seed in enumerate(seeds):
-            rng, _ = seeding.np_random(seed)
-            x, y, yaw = single.scene.start
-            y += float(rng.uniform(-1.0, 1.0)) * single.scene.start_width
-            ahead = (x + SET_POINT * math.cos(yaw), y + SET_POINT * math.sin(yaw), yaw)
-            route = make_route(single._route_name, single.scene, ahead, rng, single._walking_speed)
-            steps = math.ceil(route.duration / single.dt) + 1
-            tables.append(_table(route, steps, single.dt))
-            world = self._worlds[i]
-            world["x"], world["y"], world["yaw"] = x, y, yaw
-            world["duration"], world["rows"] = route.duration, steps
-            tapes.append([[*rng.standard_normal(2), *rng.random(4)] for _ in range(steps)])
-        self._tapes, self._tables = np.array(tapes), np.array(tables)
-        everyone = np.ones(self.num_envs, bool)
-        self._seed(seeds, everyone)
-        self._worlds["given_start"] = True
-        return self._begin(everyone)
+        self._seed(seeds, np.ones(self.num_envs, bool))
+        self._episodes.start_as_single(seeds)
+        return self._begin(np.ones(self.num_envs, bool))
 
     def step(self, actions: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Drive every world for one control period; a world that ended begins anew as `autoreset_mode` says."""
@@ -159,6 +154,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
             raise ValueError(f"the action of world {i} is {commands[i].tolist()}; expected finite numbers in [-1, 1]")
         todo = np.full(self.num_envs, STEP, np.int8)
         if self._mode is AutoresetMode.NEXT_STEP:
+            self._draw(self._done)
             todo[self._done] = BEGIN
         elif self._mode is AutoresetMode.DISABLED and self._done.any():
             i = int(np.argmax(self._done))
@@ -172,6 +168,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         final: dict[str, Any] = {}
         if self._mode is AutoresetMode.SAME_STEP and self._done.any():
             final = self._finals(*self._observed(observations.copy(), infos.copy(), self._done.copy()))
+            self._draw(self._done)
             self._run(np.where(self._done, BEGIN, SKIP).astype(np.int8), commands, *outcome)
         observation, info = self._observed(observations, infos, np.ones(self.num_envs, bool))
         return observation, rewards, terminated, truncated, {**info, **final}
@@ -181,7 +178,17 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         if self._pool is not None:
             self._pool.shutdown()
 
+    def _draw(self, begins: np.ndarray) -> None:
+        """Draw what the next episodes of these worlds (n,) are, where the compiled code does not."""
+        episodes, queues = self._episodes, self._queues
+        if episodes.is_drawn and begins.any():
+            episodes.draw(begins)
+            if episodes.longest_delay > queues.shape[1]:
+                self._queues = np.zeros((self.num_envs, episodes.longest_delay, 3))
+                self._queues[:, : queues.shape[1]] = queues
+
     def _begin(self, chosen: np.ndarray) -> tuple[Any, dict[str, Any]]:
+        self._draw(chosen)
         outcome = self._outcome()
         observations, infos, *_ = outcome
         if not chosen.all():
@@ -197,7 +204,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
             self._observations = observations.copy()
             return observations, info
         colors, depth = self._pictures.observed()
-        if self._single._obs == "rgbd_uint8":
+        if self.config.obs == "rgbd_uint8":
             return colors, info | {"depth": depth, "_depth": mask}
         return {"rgb": colors, "depth": depth, "twist": infos["twist"].astype(np.float32)}, info
 
@@ -212,7 +219,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         failures = sum(self._share([partial(self._play, *ends, todo, *arrays) for ends in self._ranges]))
         if failures:
             raise ValueError(
-                f"no route of 12 m with turns of 20-50 deg fits the scene {self._single.scene.name!r} in {failures} "
+                f"no route of 12 m with turns of 20-50 deg fits the scene {self._episodes.scene.name!r} in {failures} "
                 "worlds; widen its free lane"
             )
         if self._pictures is not None and not all(self._share(self._pictures.jobs(todo))):
@@ -224,8 +231,9 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
         return [jobs[0](), *(other.result() for other in others)]
 
     def _play(self, first: int, last: int, todo: np.ndarray, actions: np.ndarray, *outcome: np.ndarray) -> int:
-        given = (todo, self._worlds, self._queues, self._tapes, self._tables, self._settings, self._place, actions)
-        return play(first, last, *given, *outcome)
+        episodes = self._episodes
+        given = (todo, self._worlds, self._queues, episodes.tapes, episodes.tables, episodes.settings, episodes.place)
+        return play(first, last, *given, actions, *outcome)
 
     def _mask(self, mask: Any) -> np.ndarray:
         if mask is None:
@@ -252,7 +260,7 @@ class FollowVectorEnv(gymnasium.vector.VectorEnv):
             drawn = np.array([keys(_entropy(int(s)), 1)[0] for s in seed], np.uint64)
         self._worlds["key"][chosen] = drawn[chosen]
         self._worlds["episode"][chosen] = 0
-        self._worlds["route"][chosen] = self._settings["route"][0]
+        self._worlds["route"][chosen] = self._episodes.settings["route"][0]
         self._started = True
 
     def _place_robots(self, poses: Any, chosen: np.ndarray) -> None:
@@ -283,24 +291,14 @@ def _shares(count: int, parts: int) -> list[tuple[int, int]]:
     return list(pairwise(edges))
 
 
-def _table(route: Route, rows: int, dt: float) -> np.ndarray:
-    """Return a route's `TABLE_COLUMNS` at times 0, dt, ..., (rows, 5)."""
-    times = [k * dt for k in range(rows)]
-    return np.array([(*route.pose(t), route.speed(t), route.walked(t)) for t in times])
-
-
-def _check_batchable(single: FollowEnv) -> None:
-    """Raise a ValueError for what `FollowEnv` can do and a batch cannot."""
-    if single._obs not in OBSERVATIONS:
-        raise ValueError(
-            f"obs {single._obs!r} is not to be had in a batch; expected one of {', '.join(map(repr, OBSERVATIONS))}, "
-            "or vectorization_mode='sync'"
-        )
-    if single._renderer_name != "raster":
-        raise ValueError(f"renderer {single._renderer_name!r} draws one world only; expected 'raster' in a batch")
-    if single.render_mode is not None:
-        raise ValueError(f"render_mode is {single.render_mode!r}; expected None in a batch: watch a FollowEnv instead")
-    check_torque(single.robot_config)
+def _pose(value: Any) -> tuple[float, float, float]:
+    try:
+        x, y, yaw = (float(number) for number in value)
+    except (TypeError, ValueError):
+        x = y = yaw = math.nan
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(yaw)):
+        raise ValueError(f"robot_pose is {value!r}; expected three finite numbers (x, y, yaw)")
+    return x, y, yaw
 
 
 def _entropy(seed: int) -> np.uint64:

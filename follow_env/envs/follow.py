@@ -21,7 +21,7 @@ from follow_env.envs.observations import (
     observation_space,
     state_values,
 )
-from follow_env.envs.task import REWARD_TERMS, SET_POINT
+from follow_env.envs.task import REWARD_TERMS, SET_POINT, TaskConfig
 from follow_env.envs.truth import in_view, seen_from_robot, surface_distance
 from follow_env.registry import choose
 from follow_env.world.bullet import World
@@ -149,6 +149,7 @@ class FollowEnv(gymnasium.Env):
         self.scene = make_scene(scene, light)
         self._route_name = choose_route(route, self.scene)
         self._walking_speed = check_walking_speed(walking_speed)
+        self._task = TaskConfig()
         self._world: World | None = None
         self._renderer: Renderer | None = None
         self._dashboard: Dashboard | None = None
@@ -237,9 +238,11 @@ class FollowEnv(gymnasium.Env):
         effort = task.effort(first, second, *self._last_action.tolist())
         self._last_action = np.array((first, second), np.float32)
         collided = self._collision != "none"
-        terms = task.reward_terms(self._bearing, self._distance, self._visible, effort, collided)
+        terms = task.reward_terms(self._task, self._bearing, self._distance, self._visible, effort, collided)
         self._rewards = dict(zip(REWARD_TERMS, terms, strict=True))
-        terminated, truncated = task.ends(collided, self._out_of_view * self.dt, self.time, self._route.duration)
+        terminated, truncated = task.ends(
+            self._task, collided, self._out_of_view * self.dt, self.time, self._route.duration
+        )
         observation = self._observe()
         info = self._info()
         self._show(info)
@@ -327,7 +330,7 @@ class FollowEnv(gymnasium.Env):
         self._visible = in_view(sight, self._world, eye, person, direction, depth, left, self._half_field)
         self._out_of_view = 0 if self._visible else self._out_of_view + 1
         self._longest_out_of_view = max(self._longest_out_of_view, self._out_of_view)
-        self._in_band += task.in_band(self._bearing, self._distance)
+        self._in_band += task.in_band(self._task, self._bearing, self._distance)
 
     def _observe(self) -> Any:
         """Return the observation, `latency_s` old in what was seen, current in odometry and action."""
@@ -371,7 +374,7 @@ class FollowEnv(gymnasium.Env):
     def _info(self) -> dict[str, Any]:
         assert self._world is not None
         longest, collided = self._longest_out_of_view * self.dt, self._collision != "none"
-        success = task.succeeds(collided, longest, self._in_band, self._steps + 1)
+        success = task.succeeds(self._task, collided, longest, self._in_band, self._steps + 1)
         info = {
             "time": self.time,
             "bearing": self._bearing,

@@ -1,36 +1,58 @@
 """What good following is: bounded reward terms (they stand in `info["rewards"]`), the ends and the rule for success."""
 
 import math
-
-SET_POINT = 1.5
-"""Following distance that is rewarded, m (paper B, section 3); the bearing's set point is 0 rad."""
-BAND_DISTANCE = (1.0, 2.0)
-"""In band: the distance lies between these, m ..."""
-BAND_BEARING = math.radians(30.0)
-"""... and |bearing| is at most this, rad."""
-SUCCESS_BAND_SHARE = 0.8
-"""An episode succeeds without collision, in band for at least this share of its steps ..."""
-SUCCESS_OUT_OF_VIEW = 1.0
-"""... and with the person never out of view for longer than this, s."""
-LOST_AFTER = 5.0
-"""The episode ends when the person was out of view for longer than this, s."""
+from dataclasses import dataclass
+from typing import Any
 
 REWARD_TERMS = ("distance", "bearing", "visible", "smoothness", "collision")
 """Names of what `reward_terms` returns, in order."""
-DISTANCE_WEIGHT, BEARING_WEIGHT, VISIBLE_WEIGHT, SMOOTHNESS_WEIGHT, COLLISION_COST = 0.4, 0.4, 0.1, 0.1, 1.0
-"""The largest size of each term."""
-DISTANCE_SCALE, BEARING_SCALE = 0.5, 0.35
-"""Errors at which half of a term is left, m and rad."""
 TIME_ROUNDING = 1e-9
 """Times that differ by less are the same, s."""
 
 
+@dataclass(frozen=True)
+class TaskConfig:
+    """What is asked of the robot, and what it is worth.
+
+    Attributes:
+        set_point: following distance that is rewarded, m (paper B, section 3); the bearing's set point is 0 rad.
+        band_distance: in band, the distance lies between these, m ...
+        band_bearing: ... and |bearing| is at most this, rad.
+        distance_weight, bearing_weight, visible_weight, smoothness_weight: largest value of each reward term.
+        collision_cost: what a collision takes off.
+        distance_scale, bearing_scale: errors at which half of a term is left, m and rad.
+        lost_after: the episode ends when the person was out of view for longer than this, s.
+        success_band_share: an episode succeeds without collision, in band for at least this share of its steps ...
+        success_out_of_view: ... and with the person never out of view for longer than this, s.
+    """
+
+    set_point: float = 1.5
+    band_distance: tuple[float, float] = (1.0, 2.0)
+    band_bearing: float = math.radians(30.0)
+    distance_weight: float = 0.4
+    bearing_weight: float = 0.4
+    visible_weight: float = 0.1
+    smoothness_weight: float = 0.1
+    collision_cost: float = 1.0
+    distance_scale: float = 0.5
+    bearing_scale: float = 0.35
+    lost_after: float = 5.0
+    success_band_share: float = 0.8
+    success_out_of_view: float = 1.0
+
+
+SET_POINT, BAND_DISTANCE, BAND_BEARING = TaskConfig.set_point, TaskConfig.band_distance, TaskConfig.band_bearing
+SUCCESS_BAND_SHARE, SUCCESS_OUT_OF_VIEW = TaskConfig.success_band_share, TaskConfig.success_out_of_view
+"""Of the paper's task."""
+
+
 def reward_terms(
-    bearing: float, distance: float, visible: bool, effort: float, collided: bool
+    task: Any, bearing: float, distance: float, visible: bool, effort: float, collided: bool
 ) -> tuple[float, float, float, float, float]:
     """Return the terms of one step, each in its stated range.
 
     Args:
+        task: `TaskConfig`, or a record of the same names.
         bearing: truth, rad.
         distance: truth, m.
         visible: whether the person is in view.
@@ -38,16 +60,16 @@ def reward_terms(
         collided: whether the robot touches a wall or the person.
 
     Returns:
-        `distance` in [0, 0.4] and `bearing` in [0, 0.4], each half its maximum at an error of 0.5 m and 0.35 rad;
-        `visible` 0 or 0.1; `smoothness` in [0, 0.1]; `collision` -1 or 0. The sum is at most 1.
+        With the default weights `distance` in [0, 0.4] and `bearing` in [0, 0.4], each half its maximum at an error of
+        0.5 m and 0.35 rad; `visible` 0 or 0.1; `smoothness` in [0, 0.1]; `collision` -1 or 0. The sum is at most 1.
     """
-    distance_error, bearing_error = (distance - SET_POINT) / DISTANCE_SCALE, bearing / BEARING_SCALE
+    distance_error, bearing_error = (distance - task.set_point) / task.distance_scale, bearing / task.bearing_scale
     return (
-        DISTANCE_WEIGHT / (1.0 + distance_error * distance_error),
-        BEARING_WEIGHT / (1.0 + bearing_error * bearing_error),
-        VISIBLE_WEIGHT if visible else 0.0,
-        SMOOTHNESS_WEIGHT * (1.0 - 0.5 * effort),
-        -COLLISION_COST if collided else 0.0,
+        task.distance_weight / (1.0 + distance_error * distance_error),
+        task.bearing_weight / (1.0 + bearing_error * bearing_error),
+        task.visible_weight if visible else 0.0,
+        task.smoothness_weight * (1.0 - 0.5 * effort),
+        -task.collision_cost if collided else 0.0,
     )
 
 
@@ -61,35 +83,34 @@ def total(terms: tuple[float, float, float, float, float]) -> float:
     return (((terms[0] + terms[1]) + terms[2]) + terms[3]) + terms[4]
 
 
-def in_band(bearing: float, distance: float) -> bool:
+def in_band(task: Any, bearing: float, distance: float) -> bool:
     """Whether the robot follows at about the right distance with the person about ahead."""
-    return BAND_DISTANCE[0] <= distance <= BAND_DISTANCE[1] and abs(bearing) <= BAND_BEARING
+    return bool(task.band_distance[0] <= distance <= task.band_distance[1] and abs(bearing) <= task.band_bearing)
 
 
-def ends(collided: bool, out_of_view: float, time: float, duration: float) -> tuple[bool, bool]:
+def ends(task: Any, collided: bool, out_of_view: float, time: float, duration: float) -> tuple[bool, bool]:
     """Return (terminated, truncated): a collision or a lost person terminates, the route's end truncates.
 
     Args:
+        task: see `reward_terms`.
         collided: whether the robot touches a wall or the person.
         out_of_view: how long the person has been out of view, s.
         time: since the start, s.
         duration: of the route, s.
     """
-    terminated = collided or out_of_view > LOST_AFTER
+    terminated = collided or out_of_view > task.lost_after
     return terminated, not terminated and time >= duration - TIME_ROUNDING
 
 
-def succeeds(collided: bool, longest_out_of_view: float, steps_in_band: int, steps: int) -> bool:
+def succeeds(task: Any, collided: bool, longest_out_of_view: float, steps_in_band: int, steps: int) -> bool:
     """Whether an episode of so many steps, the first moment included, is one of good following.
 
     Args:
+        task: see `reward_terms`.
         collided: whether it ended in a collision.
         longest_out_of_view: the longest time without the person in view, s.
         steps_in_band: of the steps.
         steps: all of them.
     """
-    return (
-        not collided
-        and longest_out_of_view <= SUCCESS_OUT_OF_VIEW + TIME_ROUNDING
-        and steps_in_band >= SUCCESS_BAND_SHARE * steps
-    )
+    in_time = longest_out_of_view <= task.success_out_of_view + TIME_ROUNDING
+    return bool(not collided and in_time and steps_in_band >= task.success_band_share * steps)

@@ -10,7 +10,6 @@ from follow_env.camera.measurement import gauss_markov, measured, next_errors
 from follow_env.compilation import compilable
 from follow_env.envs import task
 from follow_env.envs.observations import measurement_values, no_measurement_values, state_values
-from follow_env.envs.task import SET_POINT
 from follow_env.envs.truth import in_view, seen_from_robot, surface_distance
 from follow_env.world.kinematic.drive import roll
 from follow_env.world.kinematic.philox import NOISE, OUTLIER, PICTURE, START, normals, uniforms, words
@@ -36,36 +35,30 @@ _jit = njit(nogil=True, error_model="numpy", forceinline=True)
 def begin(world, settings, place, tables, i):
     """Start the next episode of world i; False if no route fits.
 
-    What is there already: with `given_pose` the robot's pose; with `given_start` that, the person's motion in `tables`
-    and the draws of the measurement's errors; with the setting `by_table` the motion.
+    What is there already: with `given_pose` the robot's pose; with `given_motion` that and the person's motion, in
+    `tables`; with `given_draws` the draws of the measurement's errors.
     """
     world.episode += 1
     world.steps = 0
-    world.taped, world.by_table = world.given_start, world.given_start or settings.by_table
+    world.by_table, world.taped = world.given_motion, world.given_draws
     fits = True
-    if not world.given_start:
-        x, y, yaw = start_of(world, settings)
+    if not world.given_motion:
+        x, y, yaw = settings.start_x, settings.start_y, settings.start_yaw
+        y += (2.0 * uniforms(world, 0, 0, START)[0] - 1.0) * settings.start_width
         if not world.given_pose:
             world.x, world.y, world.yaw = x, y, yaw
-        if not world.by_table:
-            world.person_x, world.person_y = x + SET_POINT * math.cos(yaw), y + SET_POINT * math.sin(yaw)
-            world.route_heading = yaw
-            fits = draw_route(world, place, settings.stretch)
+        away = settings.task.set_point
+        world.person_x, world.person_y = x + away * math.cos(yaw), y + away * math.sin(yaw)
+        world.route_heading = yaw
+        fits = draw_route(world, place, settings.stretch)
     start_person(world, tables, i)
-    world.given_pose, world.given_start, world.route = False, False, settings.route
+    world.given_pose, world.given_motion, world.given_draws, world.route = False, False, False, settings.route
     world.left, world.right, world.command_left, world.command_right = 0.0, 0.0, 0.0, 0.0
     world.v, world.omega, world.first, world.second = 0.0, 0.0, 0.0, 0.0
     world.out_of_view, world.longest_out_of_view, world.in_band, world.collision = 0, 0, 0, 0
     world.saturated, world.last_measured = False, 0.0
     _look(world, settings, place)
     return fits
-
-
-@_jit
-def start_of(world, settings):
-    """Return where the robot starts (x, y, yaw): somewhere across the scene's start."""
-    y = settings.start_y + (2.0 * uniforms(world, 0, 0, START)[0] - 1.0) * settings.start_width
-    return settings.start_x, y, settings.start_yaw
 
 
 @_jit
@@ -108,10 +101,12 @@ def step(world, settings, place, tables, i, first, second, rewards):
     effort = task.effort(first, second, world.first, world.second)
     world.first, world.second = float(np.float32(first)), float(np.float32(second))
     collided = world.collision > 0
-    terms = task.reward_terms(world.bearing, world.distance, world.visible, effort, collided)
+    terms = task.reward_terms(settings.task, world.bearing, world.distance, world.visible, effort, collided)
     for k in range(len(terms)):
         rewards[k] = terms[k]
-    return task.ends(collided, world.out_of_view * settings.dt, world.steps * settings.dt, world.duration)
+    return task.ends(
+        settings.task, collided, world.out_of_view * settings.dt, world.steps * settings.dt, world.duration
+    )
 
 
 @_jit
@@ -128,7 +123,7 @@ def _look(world, settings, place):
     world.visible = in_view(free_sight, place, eye, person, direction, depth, left, settings.half_view)
     world.out_of_view = 0 if world.visible else world.out_of_view + 1
     world.longest_out_of_view = max(world.longest_out_of_view, world.out_of_view)
-    world.in_band += task.in_band(world.bearing, world.distance)
+    world.in_band += task.in_band(settings.task, world.bearing, world.distance)
     if settings.pictures:
         if not world.by_table:
             t = world.steps * settings.dt
@@ -191,4 +186,4 @@ def report(world, settings, info):
     info.collision_with = world.collision
     info.visible, info.collision, info.saturated = world.visible, world.collision > 0, world.saturated
     longest = world.longest_out_of_view * settings.dt
-    info.is_success = task.succeeds(world.collision > 0, longest, world.in_band, world.steps + 1)
+    info.is_success = task.succeeds(settings.task, world.collision > 0, longest, world.in_band, world.steps + 1)

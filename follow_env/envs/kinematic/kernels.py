@@ -17,7 +17,11 @@ SKIP, BEGIN, STEP = range(3)
 
 def _sources() -> list[Path]:
     package = Path(__file__).parents[2]
-    own = [path for path in Path(__file__).parent.glob("*.py") if path.stem not in ("render_worlds", "pictures")]
+    own = [
+        path
+        for path in Path(__file__).parent.glob("*.py")
+        if path.stem not in ("render_worlds", "pictures", "episodes", "standin")
+    ]
     world = [*package.glob("world/kinematic/*.py"), *package.glob("world/motion/*.py"), package / "world/clearance.py"]
     parts = "world/clock", "world/people/dimensions", "world/robots/diff_drive", "camera/measurement"
     envs = "envs/observations", "envs/task", "envs/truth"
@@ -50,7 +54,7 @@ def _compiled(sources: int) -> Callable[..., int]:
             last: of the range, exclusive.
             todo: (n,) int8, `SKIP`, `BEGIN` or `STEP` for each world.
             worlds: (n,) `records.WORLD`.
-            queues: (n, delay, 3) float64, delayed measurements.
+            queues: (n, longest delay, 3) float64, delayed measurements.
             tapes: (n, steps, 6) float64, given draws of the measurement's errors; read for the worlds that are `taped`.
             tables: (n, rows, 5) float64, motions: `records.TABLE_COLUMNS`; read for the worlds that are `by_table`.
             settings: (1,) `records.SETTINGS`, or (n,) if each world has its own.
@@ -82,7 +86,7 @@ def _compiled(sources: int) -> Callable[..., int]:
                     draws = _taped(tapes, i, world.steps) if world.taped else draw(world, setting)
                     measured = measure(world, setting, draws)
                     if setting.delay > 0:
-                        measured = _delayed(queues, i, world.steps, measured)
+                        measured = _delayed(queues, i, setting.delay, world.steps, measured)
                 observation = observe(world, setting, measured)
                 for k in range(8):
                     observations[i, k] = observation[k]
@@ -104,9 +108,8 @@ def _taped(tapes, i, steps):
 
 
 @_inline
-def _delayed(queues, i, steps, measured):
+def _delayed(queues, i, delay, steps, measured):
     """Put a measurement into the queue of world i; return the one that was put there `delay` steps ago."""
-    delay = queues.shape[1]
     k = steps % delay
     old = steps >= delay and queues[i, k, 0] > 0.0, queues[i, k, 1], queues[i, k, 2]
     queues[i, k, 0], queues[i, k, 1], queues[i, k, 2] = measured

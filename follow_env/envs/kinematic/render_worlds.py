@@ -67,7 +67,7 @@ class Studio(NamedTuple):
 
 def _compiled(sources: int) -> Callable[..., bool]:
     @njit(cache=True, nogil=True, error_model="numpy")
-    def paint(first, last, todo, worlds, studio, rgb, depth, colors, distances):
+    def paint(first, last, todo, worlds, settings, studio, rgb, depth, colors, distances):
         """Draw the worlds first <= i < last that begin or step; hand over what all of them observe.
 
         Args:
@@ -75,6 +75,7 @@ def _compiled(sources: int) -> Callable[..., bool]:
             last: of the range, exclusive.
             todo: (n,) int8, `SKIP`, `BEGIN` or `STEP` for each world.
             worlds: (n,) `records.WORLD`.
+            settings: (1,) `records.SETTINGS`, or (n,) if each world has its own.
             studio: `Studio`.
             rgb: (slots, n, H, W, 3) uint8, the latest pictures; all slots are filled when a world begins.
             depth: (slots, n, H, W) float32, m.
@@ -85,10 +86,10 @@ def _compiled(sources: int) -> Callable[..., bool]:
             Whether all of it was finite.
         """
         key = sources  # noqa: F841  captured, hence part of the cache key
-        slots = rgb.shape[0]
+        slots, own = rgb.shape[0], 1 if len(settings) > 1 else 0
         for i in range(first, last):
             world = worlds[i]
-            latest, oldest = world.steps % slots, (world.steps + 1) % slots
+            latest, oldest = world.steps % slots, (world.steps + slots - settings[own * i].delay) % slots
             if todo[i] != SKIP:
                 if not _draw(world, studio):
                     return False

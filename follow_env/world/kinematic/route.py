@@ -8,7 +8,6 @@ from numba import njit
 from follow_env.compilation import compilable
 from follow_env.world.kinematic.philox import ROUTE, START, uniforms
 from follow_env.world.kinematic.place import nearer_than
-from follow_env.world.kinematic.records import MOST_TURNS, ROUTE_NUMBERS
 from follow_env.world.motion.profile import speed_at, turned_at, walked_at
 from follow_env.world.motion.routes import (
     ATTEMPTS,
@@ -27,7 +26,11 @@ from follow_env.world.motion.routes import (
     TABLE_STEP,
 )
 
-_PAPER, _STANDING = ROUTE_NUMBERS["paper"], ROUTE_NUMBERS["standing"]
+KERNEL_ROUTES = ("paper", "straight", "standing")
+"""Routes that are drawn here, by their number in a world's record. All others come as tables."""
+MOST_TURNS = 2
+"""Turns that a paper route can have."""
+_PAPER, _STANDING = KERNEL_ROUTES.index("paper"), KERNEL_ROUTES.index("standing")
 _UNKNOWN = -1.0  # a speed like no other: speeds are not negative
 
 compilable(speed_at, turned_at, walked_at)

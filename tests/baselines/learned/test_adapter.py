@@ -104,3 +104,23 @@ def test_teachers_see_the_truth_of_each_world() -> None:
         )
     assert ended > 0
     worlds.close()
+
+
+def test_the_infos_hold_the_terms_of_the_reward() -> None:
+    """They add up to the rewards, step by step and over an episode, the last step of it included."""
+    worlds = FollowVecEnv([batch(CORRIDOR, 3), batch(INDOOR, 2)], reward_terms=True)
+    worlds.seed(3)
+    worlds.reset()
+    rng, returns, finished = np.random.default_rng(1), np.zeros(5), 0
+    for _ in range(450):
+        _, rewards, dones, infos = worlds.step(rng.uniform(-1.0, 1.0, (5, 2)).astype(np.float32))
+        returns += rewards
+        for i, info in enumerate(infos):
+            assert sum(info["rewards"].values()) == pytest.approx(rewards[i], abs=1e-6)
+            if dones[i]:
+                assert sum(info["episode_rewards"].values()) == pytest.approx(returns[i], abs=1e-3)
+                assert info["episode_rewards"]["collision"] in (0.0, -1.0)
+                returns[i] = 0.0
+                finished += 1
+    assert finished >= 5
+    worlds.close()

@@ -189,7 +189,7 @@ def test_statistics_of_episodes_are_recorded(make):
         ({"num_envs": 0}, "num_envs is 0; expected a whole number from 1"),
         ({"num_envs": 2, "threads": 0}, "threads is 0"),
         ({"num_envs": 2, "autoreset_mode": "SameSteps"}, "did you mean 'SameStep'"),
-        ({"num_envs": 2, "obs": "rgbd_box"}, "'rgbd_box' is not to be had in a batch"),
+        ({"num_envs": 2, "obs": "rgbd_box"}, "a batch does not observe 'rgbd_box'"),
         ({"num_envs": 2, "renderer": "tiny"}, "'tiny' draws one world only"),
         ({"num_envs": 2, "render_mode": "rgb_array"}, "expected None in a batch"),
         ({"num_envs": 2, "robot": {"max_wheel_torque": 0.1}}, "knows no torque"),

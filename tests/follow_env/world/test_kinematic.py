@@ -2,6 +2,8 @@
 
 import inspect
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -138,3 +140,26 @@ def test_a_line_of_sight_may_have_any_heights():
 def test_a_torque_limit_is_refused():
     with pytest.raises(ValueError, match=r"max_wheel_torque is 0\.1, but the kinematic engine knows no torque"):
         KinematicWorld(make_scene("corridor"), RobotConfig(max_wheel_torque=0.1))
+
+
+WITHOUT_PYBULLET = """
+import sys
+sys.modules["pybullet"] = None
+import numpy as np
+from follow_env.envs.batch import FollowVectorEnv
+batch = FollowVectorEnv(3, obs="measurement")
+batch.reset(seed=0)
+ended = np.zeros(3, bool)
+while not ended.any():
+    *_, terminated, truncated, info = batch.step(np.full((3, 2), (0.4, 0.0)))
+    ended = terminated | truncated
+assert info["time"].max() > 2.0
+pictures = FollowVectorEnv(2, obs="rgbd", camera={"width": 32, "height": 24})
+pictures.reset(seed=0)
+pictures.step(np.zeros((2, 2)))
+"""
+
+
+def test_batch_and_kinematic_world_need_no_pybullet():
+    done = subprocess.run([sys.executable, "-c", WITHOUT_PYBULLET], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

@@ -1,23 +1,10 @@
-"""What the kernels work on: one record per world, one record of settings, one record of information per world."""
-
-import math
-from typing import TYPE_CHECKING
+"""What the kernels work on: one record per world, one of its settings, one of information."""
 
 import numpy as np
 
 from follow_env.camera.measurement import ErrorModel
-from follow_env.world.kinematic.drive import kept_speed_error
-from follow_env.world.motion.routes import PAPER_SPEED, ROUTES
-
-if TYPE_CHECKING:
-    from follow_env.envs.follow import FollowEnv
-
-MOST_TURNS = 2
-"""Turns that a world's route can have."""
-PERSON_STEP = 1.0 / 30.0
-"""The person's path is integrated (Simpson) in steps of at most this, s."""
-ROUTE_NUMBERS = {name: number for number, name in enumerate(ROUTES)}
-"""Route name -> its number in a world's record."""
+from follow_env.envs.task import TaskConfig
+from follow_env.world.kinematic.route import MOST_TURNS
 
 
 def _reals(*names: str) -> list[tuple[str, type]]:
@@ -41,7 +28,7 @@ WORLD = np.dtype(
         *_reals("bearing", "distance", "surface_distance"),
         *_reals("bearing_error", "distance_error", "outlier", "last_measured"),
         *((name, np.bool_) for name in ("visible", "saturated")),
-        *((name, np.bool_) for name in ("given_pose", "given_start", "by_table", "taped")),  # see `episode.begin`
+        *((name, np.bool_) for name in ("given_pose", "given_motion", "given_draws", "by_table", "taped")),
     ],
     align=True,
 )
@@ -66,46 +53,22 @@ INFO = np.dtype(
 TABLE_COLUMNS = ("x", "y", "heading", "speed", "walked")
 """Of a motion's table, one row each control step: m, m, rad, m/s and m."""
 
+TASK = np.dtype([(name, np.float64, np.shape(value)) for name, value in vars(TaskConfig()).items()], align=True)
+"""A `TaskConfig`."""
+
 SETTINGS = np.dtype(
     [
         ("observe_state", np.bool_),
         ("measure", np.bool_),
         ("pictures", np.bool_),
         ("wheel_actions", np.bool_),
-        ("by_table", np.bool_),
         *((name, np.int64) for name in ("route", "substeps", "person_substeps", "delay")),
         *_reals("dt", "decay", "stretch", "start_x", "start_y", "start_yaw", "start_width"),
         *_reals("track_width", "wheel_radius", "max_speed", "max_yaw_rate", "max_wheel_speed"),
         *_reals("max_wheel_acceleration", "camera_forward", "camera_height", "hull_radius", "half_view"),
         *_reals(*ErrorModel._fields),
+        ("task", TASK),
     ],
     align=True,
 )
-"""What all worlds share: the settings of a `FollowEnv` as the kernels want them."""
-
-
-def pack_settings(env: "FollowEnv") -> np.ndarray:
-    """Return the settings of `env`, (1,) `SETTINGS`."""
-    packed = np.zeros(1, SETTINGS)
-    robot, start = env.robot_config, env.scene.start
-    values = {
-        "observe_state": env._obs == "state",
-        "measure": env._obs == "measurement",
-        "pictures": env._obs.startswith("rgbd"),
-        "wheel_actions": env._action == "wheels",
-        "by_table": False,
-        "route": ROUTE_NUMBERS[env._route_name],
-        "substeps": env._substeps,
-        "person_substeps": max(math.ceil(env.dt / PERSON_STEP - 1e-9), 1),
-        "delay": env._delay,
-        "dt": env.dt,
-        "decay": kept_speed_error(env.dt, env._substeps, robot.wheel_time_constant),
-        "stretch": PAPER_SPEED / env._walking_speed,
-        **dict(zip(("start_x", "start_y", "start_yaw"), start, strict=True)),
-        "start_width": env.scene.start_width,
-        "half_view": math.tan(0.5 * env.camera.hfov),
-        **ErrorModel.of(env._sensor.measurement, env.dt)._asdict(),
-    }
-    for name in SETTINGS.names or ():
-        packed[name] = values[name] if name in values else getattr(robot, name)
-    return packed
+"""The settings of an episode as the kernels want them."""

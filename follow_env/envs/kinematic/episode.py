@@ -97,7 +97,7 @@ def step(world, settings, place, tables, i, first, second, rewards):
     world.saturated = is_saturated(left, right, world.command_left, world.command_right)
     _look(world, settings, place)
     robot, person = (world.x, world.y, world.cosine, world.sine), (world.person_x, world.person_y)
-    world.collision = touched(place, *robot, *person, settings.wheel_radius, 0.5 * settings.track_width)
+    world.collision = touched(place, settings.hull, *robot, *person)
     effort = task.effort(first, second, world.first, world.second)
     world.first, world.second = float(np.float32(first)), float(np.float32(second))
     collided = world.collision > 0

@@ -12,6 +12,7 @@ from follow_env.camera.measurement import ErrorModel
 from follow_env.envs.kinematic.records import SETTINGS, TABLE_COLUMNS, TASK
 from follow_env.envs.kinematic.standin import EnvConfig, make_motion, motion_table
 from follow_env.world.kinematic.drive import kept_speed_error
+from follow_env.world.kinematic.hull import pack_hull
 from follow_env.world.kinematic.place import pack_place
 from follow_env.world.kinematic.route import KERNEL_ROUTES
 from follow_env.world.kinematic.world import check_torque
@@ -180,6 +181,7 @@ class Episodes:
             **dict(zip(("start_x", "start_y", "start_yaw"), start, strict=True)),
             "start_width": self.scene.start_width,
             "half_view": math.tan(0.5 * math.radians(config.camera.hfov_deg)),
+            "hull": pack_hull(robot),
             "task": tuple(getattr(task, name) for name in TASK.names or ()),
             **ErrorModel.of(config.sensor.measurement, config.dt)._asdict(),
         }

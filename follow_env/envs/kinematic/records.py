@@ -4,6 +4,7 @@ import numpy as np
 
 from follow_env.camera.measurement import ErrorModel
 from follow_env.envs.task import TaskConfig
+from follow_env.world.kinematic.hull import HULL
 from follow_env.world.kinematic.route import MOST_TURNS
 
 
@@ -64,10 +65,11 @@ SETTINGS = np.dtype(
         ("wheel_actions", np.bool_),
         *((name, np.int64) for name in ("route", "substeps", "person_substeps", "delay")),
         *_reals("dt", "decay", "stretch", "start_x", "start_y", "start_yaw", "start_width"),
-        *_reals("track_width", "wheel_radius", "max_speed", "max_yaw_rate", "max_wheel_speed"),
+        *_reals("track_width", "max_speed", "max_yaw_rate", "max_wheel_speed"),
         *_reals("max_wheel_acceleration", "camera_forward", "camera_height", "hull_radius", "half_view"),
         *_reals(*ErrorModel._fields),
         ("task", TASK),
+        ("hull", HULL),
     ],
     align=True,
 )

@@ -18,19 +18,11 @@ from follow_env.world.scene import FOOTPRINT, Scene, footprint
 CELL = 0.1
 """Size of the grid's cells, m."""
 
-# The robot's parts as `follow_env.world.bullet` builds them, seen from the axle's middle, m.
-CHASSIS_MIDDLE, CHASSIS_LENGTH, CHASSIS_WIDTH = -0.05, 0.15, 0.11  # half sizes
-CHASSIS_LOW, CHASSIS_HIGH = 0.05, 0.15
-CASTER_MIDDLE, CASTER_RADIUS = -0.18, 0.03
-MAST_MIDDLE, MAST_RADIUS, MAST_LOW, MAST_HIGH = -0.07, 0.03, 0.16, 0.96
 PERSON_RADIUS = dimensions.RADIUS
 PERSON_LOW = 0.5 * dimensions.HEIGHT - 0.5 * dimensions.STRAIGHT
 """Height of the center of the lower half-sphere of the person's capsule, m."""
 COLLISIONS = ("none", "wall", "person")
 """What a robot touches, by the number that `touched` returns."""
-FURTHEST = 0.24
-"""All parts but the wheels lie in a circle of this radius around the axle's middle, m."""
-
 OBSTACLE = np.dtype(FOOTPRINT.descr + [(name, "<f8") for name in ("low", "high", "reach")])
 """An upright prism: a footprint between two heights, within `reach` of (x, y); m."""
 
@@ -100,25 +92,24 @@ def nearer_than(place, x, y, radius):
 
 
 @_jit
-def touches_place(place, x, y, cosine, sine, wheel_radius, half_track):
+def touches_place(place, hull, x, y, cosine, sine):
     """Whether the level robot overlaps an obstacle: chassis, two wheels, caster and mast, each exactly."""
-    furthest = max(FURTHEST, half_track + wheel_radius)
-    if _bounds(place.distance, place, x, y)[0] > furthest:
+    if _bounds(place.distance, place, x, y)[0] > hull.reach:
         return False
     for k in range(len(place.obstacles)):
         o = place.obstacles[k]
         dx, dy = o.x - x, o.y - y
-        if dx * dx + dy * dy > (o.reach + furthest) ** 2:
+        if dx * dx + dy * dy > (o.reach + hull.reach) ** 2:
             continue
-        for side in (-half_track, half_track):
-            if gap(o, x - side * sine, y + side * cosine) < _ball(wheel_radius, o.low, o.high):
+        for side in (-hull.half_track, hull.half_track):
+            if gap(o, x - side * sine, y + side * cosine) < _ball(hull.wheel_radius, o.low, o.high):
                 return True
-        if gap(o, x + CASTER_MIDDLE * cosine, y + CASTER_MIDDLE * sine) < _ball(CASTER_RADIUS, o.low, o.high):
+        if gap(o, x + hull.caster * cosine, y + hull.caster * sine) < _ball(hull.caster_radius, o.low, o.high):
             return True
-        beside_mast = o.low < MAST_HIGH and o.high > MAST_LOW
-        if beside_mast and gap(o, x + MAST_MIDDLE * cosine, y + MAST_MIDDLE * sine) < MAST_RADIUS:
+        beside_mast = o.low < hull.mast_high and o.high > hull.mast_low
+        if beside_mast and gap(o, x + hull.mast * cosine, y + hull.mast * sine) < hull.mast_radius:
             return True
-        if o.low < CHASSIS_HIGH and o.high > CHASSIS_LOW and _chassis_overlaps(o, x, y, cosine, sine):
+        if o.low < hull.high and o.high > hull.low and _chassis_overlaps(o, hull, x, y, cosine, sine):
             return True
     return False
 
@@ -131,51 +122,48 @@ def _ball(radius, low, high):
 
 
 @_jit
-def _chassis_overlaps(o, x, y, cosine, sine):
+def _chassis_overlaps(o, hull, x, y, cosine, sine):
     """Whether the chassis' rectangle overlaps an obstacle's footprint (separating axes; a disc by its distance)."""
-    dx, dy = o.x - (x + CHASSIS_MIDDLE * cosine), o.y - (y + CHASSIS_MIDDLE * sine)
+    dx, dy = o.x - (x + hull.middle * cosine), o.y - (y + hull.middle * sine)
     along, across = abs(dx * cosine + dy * sine), abs(dy * cosine - dx * sine)
     if o.radius > 0.0:
-        along, across = max(along - CHASSIS_LENGTH, 0.0), max(across - CHASSIS_WIDTH, 0.0)
+        along, across = max(along - hull.length, 0.0), max(across - hull.width, 0.0)
         return along * along + across * across < o.radius * o.radius
     c, s = abs(cosine * o.cosine + sine * o.sine), abs(sine * o.cosine - cosine * o.sine)
-    if along > CHASSIS_LENGTH + o.length * c + o.width * s or across > CHASSIS_WIDTH + o.length * s + o.width * c:
+    if along > hull.length + o.length * c + o.width * s or across > hull.width + o.length * s + o.width * c:
         return False
     along, across = abs(dx * o.cosine + dy * o.sine), abs(dy * o.cosine - dx * o.sine)
-    return (
-        along <= o.length + CHASSIS_LENGTH * c + CHASSIS_WIDTH * s
-        and across <= o.width + CHASSIS_LENGTH * s + CHASSIS_WIDTH * c
-    )
+    return along <= o.length + hull.length * c + hull.width * s and across <= o.width + hull.length * s + hull.width * c
 
 
 @_jit
-def touches_person(x, y, cosine, sine, person_x, person_y, wheel_radius, half_track):
+def touches_person(hull, x, y, cosine, sine, person_x, person_y):
     """Whether the level robot overlaps the person's capsule."""
     dx, dy = person_x - x, person_y - y
     along, across = dx * cosine + dy * sine, dy * cosine - dx * sine
-    if along * along + across * across > (max(FURTHEST, half_track + wheel_radius) + PERSON_RADIUS) ** 2:
+    if along * along + across * across > (hull.reach + PERSON_RADIUS) ** 2:
         return False
     for middle, offset, radius in (
-        (0.0, half_track, wheel_radius),
-        (0.0, -half_track, wheel_radius),
-        (CASTER_MIDDLE, 0.0, CASTER_RADIUS),
+        (0.0, hull.half_track, hull.wheel_radius),
+        (0.0, -hull.half_track, hull.wheel_radius),
+        (hull.caster, 0.0, hull.caster_radius),
     ):
         rise = max(PERSON_LOW - radius, 0.0)
         if (along - middle) ** 2 + (across - offset) ** 2 + rise * rise < (PERSON_RADIUS + radius) ** 2:
             return True
-    if (along - MAST_MIDDLE) ** 2 + across * across < (PERSON_RADIUS + MAST_RADIUS) ** 2:
+    if (along - hull.mast) ** 2 + across * across < (PERSON_RADIUS + hull.mast_radius) ** 2:
         return True
-    rise = PERSON_LOW - CHASSIS_HIGH
-    beyond = max(abs(along - CHASSIS_MIDDLE) - CHASSIS_LENGTH, 0.0), max(abs(across) - CHASSIS_WIDTH, 0.0)
+    rise = PERSON_LOW - hull.high
+    beyond = max(abs(along - hull.middle) - hull.length, 0.0), max(abs(across) - hull.width, 0.0)
     return beyond[0] ** 2 + beyond[1] ** 2 + rise * rise < PERSON_RADIUS * PERSON_RADIUS
 
 
 @_jit
-def touched(place, x, y, cosine, sine, person_x, person_y, wheel_radius, half_track):
+def touched(place, hull, x, y, cosine, sine, person_x, person_y):
     """Return what the level robot touches: 0 = nothing, 1 = an obstacle, 2 = the person."""
-    if touches_person(x, y, cosine, sine, person_x, person_y, wheel_radius, half_track):
+    if touches_person(hull, x, y, cosine, sine, person_x, person_y):
         return 2
-    return 1 if touches_place(place, x, y, cosine, sine, wheel_radius, half_track) else 0
+    return 1 if touches_place(place, hull, x, y, cosine, sine) else 0
 
 
 @_jit

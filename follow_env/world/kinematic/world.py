@@ -6,12 +6,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numba import njit
 
 from follow_env.compilation import announced, digest
 from follow_env.config import RobotConfig
 from follow_env.world.clock import PHYSICS_HZ
 from follow_env.world.kinematic.drive import kept_speed_error, roll
+from follow_env.world.kinematic.hull import HULL, pack_hull
 from follow_env.world.kinematic.place import COLLISIONS, free_sight, pack_place, touched
 from follow_env.world.people.dimensions import CHEST_HEIGHT
 from follow_env.world.robots.diff_drive import DiffDrive
@@ -39,7 +41,7 @@ class KinematicWorld:
         self._scene = scene
         self._sight_heights = sorted((config.camera_height, CHEST_HEIGHT))
         self._place = pack_place(scene, *self._sight_heights)
-        self._half_track, self._wheel_radius = 0.5 * config.track_width, config.wheel_radius
+        self._hull = np.array([pack_hull(config)], HULL)
         self.reset((0.0, 0.0, 0.0), (9.0, 0.0, 0.0))
         with announced("the kinematic world"):
             self.simulate(1)
@@ -90,8 +92,7 @@ class KinematicWorld:
     def collision(self) -> str:
         """What the robot touches: "none", "wall" (anything of the scene) or "person"."""
         x, y, _ = self._pose
-        given = (x, y, *self._direction, *self._person, self._wheel_radius, self._half_track)
-        return COLLISIONS[_touches(self._place, *given)]
+        return COLLISIONS[_touches(self._place, self._hull, x, y, *self._direction, *self._person)]
 
     def line_of_sight(self, eye: tuple[float, float, float], point: tuple[float, float, float]) -> bool:
         """Whether nothing of the scene stands between the two points (m); robot and person do not count."""
@@ -123,9 +124,9 @@ def _compiled(sources: int) -> tuple[Callable[..., Any], ...]:
         return roll(x, y, yaw, cosine, sine, left, right, command_left, command_right, decay, substeps, track)
 
     @njit(cache=True)
-    def touches(place, x, y, cosine, sine, person_x, person_y, wheel_radius, half_track):
+    def touches(place, hulls, x, y, cosine, sine, person_x, person_y):
         key = sources  # noqa: F841
-        return touched(place, x, y, cosine, sine, person_x, person_y, wheel_radius, half_track)
+        return touched(place, hulls[0], x, y, cosine, sine, person_x, person_y)
 
     @njit(cache=True)
     def sees(place, eye, point):

@@ -17,7 +17,7 @@ MAX_DISTANCE = 20.0
 def observation_space(obs: str, camera: PinholeCamera, robot: RobotConfig) -> spaces.Space:
     """Return the space of an observation mode (see `FollowEnv`)."""
     height, width = camera.height, camera.width
-    twist = (1.5 * robot.max_wheel_speed, 3.0 * robot.max_wheel_speed / robot.track_width)
+    twist = largest_twist(robot)
     if obs in ("measurement", "state"):
         own = (*twist, 1.0, 1.0)
         if obs == "measurement":
@@ -37,6 +37,11 @@ def observation_space(obs: str, camera: PinholeCamera, robot: RobotConfig) -> sp
     if obs == "rgbd_box":
         parts["box"] = spaces.Box(0.0, np.array((width, height, width, height), np.float32), (4,), np.float32)
     return spaces.Dict(parts)
+
+
+def largest_twist(robot: RobotConfig) -> tuple[float, float]:
+    """Return the largest odometry (v, omega) that an observation can hold: half as much again as the wheels can."""
+    return 1.5 * robot.max_wheel_speed, 3.0 * robot.max_wheel_speed / robot.track_width
 
 
 def state_values(bearing: Any, distance: Any, velocity: Any, direction: Any, own: Any) -> tuple[Any, ...]:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from gymnasium.utils import seeding
 from follow_env.camera.measurement import ErrorModel
 from follow_env.envs.kinematic.records import SETTINGS, TABLE_COLUMNS, TASK
 from follow_env.envs.kinematic.standin import EnvConfig, make_motion, motion_table
+from follow_env.envs.observations import largest_twist
 from follow_env.world.kinematic.drive import kept_speed_error
 from follow_env.world.kinematic.hull import pack_hull
 from follow_env.world.kinematic.place import pack_place
@@ -18,7 +19,6 @@ from follow_env.world.kinematic.route import KERNEL_ROUTES
 from follow_env.world.kinematic.world import check_torque
 from follow_env.world.motion.routes import PAPER_SPEED, choose_route
 from follow_env.world.people.dimensions import CHEST_HEIGHT
-from follow_env.world.scene import Scene
 from follow_env.world.scenes import make_scene
 
 SHARED = ("scene", "obs", "action", "camera", "renderer", "control_hz", "engine")
@@ -56,6 +56,7 @@ class Episodes:
         self._domain, self._worlds = domain, worlds
         self.is_fixed = bool(domain.is_fixed)
         self.nominal: EnvConfig = domain.nominal
+        self._known_routes: set[str] = set()
         self.scene = make_scene(self.nominal.scene, self.nominal.light)
         rng = np.random.default_rng(0)
         for config in (self.nominal, *(domain.sample(rng) for _ in range(0 if self.is_fixed else PROBES))):
@@ -157,7 +158,25 @@ class Episodes:
                     f"{name} is {one!r} in one world and {other!r} in another; the worlds of a batch share it: "
                     "give one value, or make several batches"
                 )
-        check_batchable(config, self.scene)
+        fastest, (v, omega) = config.robot.max_wheel_speed, largest_twist(self.nominal.robot)
+        if fastest > v or 2.0 * fastest / config.robot.track_width > omega:
+            raise ValueError(
+                f"a robot with max_wheel_speed {fastest!r} and track_width {config.robot.track_width!r} is faster than "
+                f"the observations hold ({v:.3g} m/s, {omega:.3g} rad/s); give the domain a faster nominal robot"
+            )
+        check_batchable(config)
+        self._check_route(config.route)
+
+    def _check_route(self, route: Any) -> None:
+        """Raise a ValueError for a route that nobody can walk here; names are looked up once."""
+        name = route["name"] if isinstance(route, Mapping) else route
+        if not isinstance(name, str) or name in self._known_routes:
+            return
+        if name == "commanded":
+            raise ValueError("route 'commanded' needs somebody who leads each person; expected another one in a batch")
+        if ":" not in name:
+            choose_route(name, self.scene)
+        self._known_routes.add(name)
 
     @staticmethod
     def _in_kernel(route: Any) -> bool:
@@ -189,15 +208,10 @@ class Episodes:
             self.settings[name][i] = values[name] if name in values else getattr(robot, name)
 
 
-def check_batchable(config: EnvConfig, scene: Scene) -> None:
+def check_batchable(config: EnvConfig) -> None:
     """Raise a ValueError for what `FollowEnv` can do and a batch cannot."""
     if config.obs == "rgbd_box":
         raise ValueError("a batch does not observe 'rgbd_box'; expected another obs, or vectorization_mode='sync'")
     if config.renderer != "raster":
         raise ValueError(f"renderer {config.renderer!r} draws one world only; expected 'raster' in a batch")
-    name = config.route["name"] if isinstance(config.route, dict) else config.route
-    if name == "commanded":
-        raise ValueError("route 'commanded' needs somebody who leads each person; expected another route in a batch")
-    if isinstance(name, str) and ":" not in name:
-        choose_route(name, scene)
     check_torque(config.robot)

@@ -132,6 +132,11 @@ def test_what_worlds_share_cannot_be_drawn(changes, name):
         FollowVectorEnv(2, Spread(lambda rng: changes))
 
 
+def test_a_robot_too_fast_for_the_observations_is_refused():
+    with pytest.raises(ValueError, match=r"max_wheel_speed 2\.5 .* faster than the observations hold"):
+        FollowVectorEnv(2, Spread(lambda rng: {"robot": RobotConfig(max_wheel_speed=2.5)}))
+
+
 def test_the_forms_of_the_constructor_agree():
     config = EnvConfig.of({"obs": "state", "walking_speed": 1.2})
     made = (

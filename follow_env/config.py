@@ -1,45 +1,71 @@
-"""Settings of the environment: frozen, typed, JSON-able, with units.
+"""`EnvConfig`, the one record of an environment's settings: frozen, typed, JSON-able, with units and bounds.
 
-Every setting is a frozen dataclass. `build` makes one from plain keyword data (what `gym.make` and a JSON file carry)
-and names the nearest key when one is unknown.
+The single environment, the batch, the followers and the benchmark read it. `EnvConfig.of` makes one from plain data
+(what `gym.make`, a JSON file and another process carry) and names the nearest key when one is unknown.
 """
 
+from __future__ import annotations
+
 import dataclasses
+import functools
 import math
-import numbers
-from collections.abc import Iterable, Mapping
-from typing import Any, TypeVar
+from collections.abc import Mapping
+from typing import Annotated, Any
 
+from follow_env.geometry import CameraMount, Intrinsics
 from follow_env.registry import choose
+from follow_env.sensors import SensorConfig, sensor_config
+from follow_env.settings import Bounds, Real, Whole, build, settings, to_data
+from follow_env.world import ENGINES
+from follow_env.world.clock import PHYSICS_HZ
+from follow_env.world.motion.profile import FASTEST, PAPER_SPEED, SLOWEST
 
-T = TypeVar("T")
-
-
-def _require(what: str, settings: Any, names: Iterable[str], above_zero: bool = False) -> None:
-    """Raise a ValueError unless each of the settings is finite and >= 0, or > 0 if `above_zero`."""
-    for name in names:
-        value = getattr(settings, name)
-        if not (math.isfinite(value) and (value > 0.0 if above_zero else value >= 0.0)):
-            raise ValueError(f"{what} {name} is {value!r}; expected a finite value {'>' if above_zero else '>='} 0")
+OBSERVATIONS = ("measurement", "state", "rgbd", "rgbd_box", "rgbd_uint8")
+ACTIONS = ("twist", "wheels")
 
 
-def _require_shares(what: str, settings: Any, names: Iterable[str]) -> None:
-    """Raise a ValueError unless each of the settings is from 0 to 1."""
-    for name in names:
-        value = getattr(settings, name)
-        if not 0.0 <= value <= 1.0:
-            raise ValueError(f"{what} {name} is {value!r}; expected a share from 0 to 1")
+@settings("robot.body")
+class RobotBody:
+    """Sizes and masses of the robot that the engines build: a box on two wheels and a caster, with a mast.
+
+    Attributes:
+        chassis_middle: middle of the box ahead of the axle, m.
+        chassis_length, chassis_width, chassis_height: of the box, m.
+        chassis_low: underside of the box above the floor, m.
+        chassis_mass: kg.
+        wheel_mass: of each wheel, kg.
+        caster_offset: of the caster ahead of the box's middle, m.
+        caster_radius: m.
+        caster_mass: kg.
+        mast_offset: of the mast ahead of the box's middle, m.
+        mast_radius, mast_height: of the mast, m.
+        mast_rise: middle of the mast above the middle of the box, m.
+        mast_mass: kg.
+    """
+
+    chassis_middle: Annotated[Real, Bounds("m", ge=-2.0, le=2.0)] = -0.05
+    chassis_length: Annotated[Real, Bounds("m", gt=0.0, le=4.0)] = 0.30
+    chassis_width: Annotated[Real, Bounds("m", gt=0.0, le=4.0)] = 0.22
+    chassis_low: Annotated[Real, Bounds("m", gt=0.0, le=1.0)] = 0.05
+    chassis_height: Annotated[Real, Bounds("m", gt=0.0, le=2.0)] = 0.10
+    chassis_mass: Annotated[Real, Bounds("kg", gt=0.0, le=500.0)] = 8.0
+    wheel_mass: Annotated[Real, Bounds("kg", gt=0.0, le=100.0)] = 0.5
+    caster_offset: Annotated[Real, Bounds("m", ge=-2.0, le=2.0)] = -0.13
+    caster_radius: Annotated[Real, Bounds("m", gt=0.0, le=1.0)] = 0.03
+    caster_mass: Annotated[Real, Bounds("kg", gt=0.0, le=100.0)] = 0.2
+    mast_offset: Annotated[Real, Bounds("m", ge=-2.0, le=2.0)] = -0.02
+    mast_radius: Annotated[Real, Bounds("m", gt=0.0, le=1.0)] = 0.03
+    mast_height: Annotated[Real, Bounds("m", gt=0.0, le=3.0)] = 0.80
+    mast_rise: Annotated[Real, Bounds("m", ge=0.0, le=3.0)] = 0.46
+    mast_mass: Annotated[Real, Bounds("kg", gt=0.0, le=100.0)] = 0.4
+
+    @property
+    def chassis_center(self) -> float:
+        """Height of the box's middle, m."""
+        return self.chassis_low + 0.5 * self.chassis_height
 
 
-def _require_share_below_one(what: str, settings: Any, names: Iterable[str]) -> None:
-    """Raise a ValueError unless each of the settings is from 0 to below 1."""
-    for name in names:
-        value = getattr(settings, name)
-        if not 0.0 <= value < 1.0:
-            raise ValueError(f"{what} {name} is {value!r}; expected a share from 0 to below 1")
-
-
-@dataclasses.dataclass(frozen=True)
+@settings("robot")
 class RobotConfig:
     """The differential-drive robot of paper B (section 3): two driven front wheels, one rear caster.
 
@@ -55,27 +81,29 @@ class RobotConfig:
         camera_forward: camera's optical center ahead of the axle, m (T_Z = -camera_forward in eq. (29)).
         camera_height: camera above the floor, m.
         hull_radius: radius of the circle around the axle midpoint that contains the chassis, m.
+        body: sizes and masses.
     """
 
-    track_width: float = 0.30
-    wheel_radius: float = 0.0625
-    max_speed: float = 1.2
-    max_yaw_rate: float = 2.0
-    max_wheel_speed: float = 1.5
-    max_wheel_acceleration: float = 2.0
-    wheel_time_constant: float = 0.06
-    max_wheel_torque: float = 2.0
-    camera_forward: float = 0.10
-    camera_height: float = 1.0
-    hull_radius: float = 0.25
+    track_width: Annotated[Real, Bounds("m", gt=0.0, le=5.0)] = 0.30
+    wheel_radius: Annotated[Real, Bounds("m", gt=0.0, le=1.0)] = 0.0625
+    max_speed: Annotated[Real, Bounds("m/s", gt=0.0, le=20.0)] = 1.2
+    max_yaw_rate: Annotated[Real, Bounds("rad/s", gt=0.0, le=50.0)] = 2.0
+    max_wheel_speed: Annotated[Real, Bounds("m/s", gt=0.0, le=20.0)] = 1.5
+    max_wheel_acceleration: Annotated[Real, Bounds("m/s^2", gt=0.0, le=1000.0)] = 2.0
+    wheel_time_constant: Annotated[Real, Bounds("s", gt=0.0, le=10.0)] = 0.06
+    max_wheel_torque: Annotated[Real, Bounds("N m", gt=0.0, le=1000.0)] = 2.0
+    camera_forward: Annotated[Real, Bounds("m", ge=-2.0, le=2.0)] = 0.10
+    camera_height: Annotated[Real, Bounds("m", gt=0.0, le=3.0)] = 1.0
+    hull_radius: Annotated[Real, Bounds("m", gt=0.0, le=2.0)] = 0.25
+    body: RobotBody = RobotBody()
 
-    def __post_init__(self) -> None:
-        if not math.isfinite(self.camera_forward):
-            raise ValueError(f"robot camera_forward is {self.camera_forward!r}; expected finite meters")
-        _require("robot", self, (f.name for f in dataclasses.fields(self) if f.name != "camera_forward"), True)
+    @functools.cached_property
+    def mount(self) -> CameraMount:
+        """Where the camera sits on the robot."""
+        return CameraMount(self.camera_forward, self.camera_height)
 
 
-@dataclasses.dataclass(frozen=True)
+@settings("camera")
 class CameraConfig:
     """A pinhole camera: an Asus Xtion Pro binned to a size that a software renderer can draw.
 
@@ -86,279 +114,215 @@ class CameraConfig:
         supersample: 1, or 2 for colors averaged over 2 x 2 rays a pixel; depth and ids are those of a pixel's center.
     """
 
-    width: int = 320
-    height: int = 240
-    hfov_deg: float = 57.5
-    near: float = 0.1
-    far: float = 30.0
-    supersample: int = 1
+    width: Annotated[Whole, Bounds("px", ge=1, le=4096)] = 320
+    height: Annotated[Whole, Bounds("px", ge=1, le=4096)] = 240
+    hfov_deg: Annotated[Real, Bounds("deg", ge=1.0, le=170.0)] = 57.5
+    near: Annotated[Real, Bounds("m", gt=0.0, le=1000.0)] = 0.1
+    far: Annotated[Real, Bounds("m", gt=0.0, le=10_000.0)] = 30.0
+    supersample: Annotated[Whole, Bounds("", ge=1, le=2)] = 1
 
     def __post_init__(self) -> None:
-        for name in ("width", "height"):
-            value = getattr(self, name)
-            if not isinstance(value, int) or not 1 <= value <= 4096:
-                raise ValueError(f"camera {name} is {value!r}; expected a whole number of pixels from 1 to 4096")
-        if not 1.0 <= self.hfov_deg <= 170.0:
-            raise ValueError(f"camera hfov_deg is {self.hfov_deg!r}; expected degrees from 1 to 170")
-        if not 0.0 < self.near < self.far < math.inf:
-            raise ValueError(
-                f"camera near, far are {self.near!r}, {self.far!r}; expected 0 < near < far in meters, finite"
-            )
-        if self.supersample not in (1, 2):
-            raise ValueError(f"camera supersample is {self.supersample!r}; expected 1 or 2")
+        if not self.near < self.far:
+            raise ValueError(f"camera near, far are {self.near!r}, {self.far!r}; expected near < far in meters")
+
+    @functools.cached_property
+    def intrinsics(self) -> Intrinsics:
+        """The pinhole of the pictures."""
+        return Intrinsics.from_hfov(self.width, self.height, math.radians(self.hfov_deg))
 
 
-@dataclasses.dataclass(frozen=True)
-class DepthConfig:
-    """Errors of a structured-light depth sensor (Xtion/Kinect), applied to the rendered depth.
-
-    The formulas are in `camera.sensor.errors.RGBDSensor`. The defaults: noise as measured by Nguyen et al. (2012,
-    Kinect) for surfaces that face the camera; eighths of a pixel of disparity, 75 mm and the loss of the projector's
-    shadow as in Khoshelham and Elberink (2012, Kinect); 0.5 m because an Xtion returns nothing nearer, 8 m because it
-    quantizes to 0.2 m there. The shares lost at edges, on dark and on grazing surfaces are stated, not measured.
+@settings("task")
+class TaskConfig:
+    """What is asked of the robot, and what it is worth.
 
     Attributes:
-        axial_noise: scale on the axial noise 0.0012 + 0.0019 (z - 0.4)^2 m of Nguyen et al. (2012); 0 switches it off.
-        lateral_noise: standard deviation on each axis of the place that a pixel's depth is taken from, px at 640 px
-            width (Nguyen et al.: 0.8 when facing, 0.9 at 60 degrees).
-        disparity_step: quantization of the disparity, px, at 640 px width (Xtion: 1/8); 0 switches it off.
-        baseline: between projector and camera, m.
-        min_range, max_range: depth outside is reported as 0 (no reading), m.
-        edge_band: a pixel is at an edge if the depth within this distance (px of the picture) jumps by more than
-            `edge_jump`.
-        edge_jump: as a share of the depth, at least of 1 m.
-        edge_holes: share of the pixels at an edge that read 0.
-        edge_flying: share of the pixels at an edge that read a depth between foreground and background.
-        shadow: share of the pixels lost where something hides the surface from the projector.
-        dark_level: luminance below which readings get lost, gray levels.
-        dark_dropout: share lost at luminance 0; falls linearly to 0 at `dark_level`.
-        grazing_deg: angle between ray and surface normal above which readings get lost, degrees.
-        grazing_dropout: share lost at 90 degrees; falls to 0 at `grazing_deg`, linearly in the cosine.
+        set_point: following distance that is rewarded, m (paper B, section 3); the bearing's set point is 0 rad.
+        band_near, band_far: in band, the distance lies between these, m ...
+        band_bearing: ... and |bearing| is at most this, rad.
+        distance_weight, bearing_weight, visible_weight, smoothness_weight: largest value of each reward term.
+        collision_cost: what a collision takes off.
+        distance_scale, bearing_scale: errors at which half of a term is left, m and rad.
+        lost_after: the episode ends when the person was out of view for longer than this, s.
+        success_band_share: an episode succeeds without collision, in band for at least this share of its steps ...
+        success_out_of_view: ... and with the person never out of view for longer than this, s.
     """
 
-    axial_noise: float = 1.0
-    lateral_noise: float = 0.8
-    disparity_step: float = 0.125
-    baseline: float = 0.075
-    min_range: float = 0.5
-    max_range: float = 8.0
-    edge_band: int = 1
-    edge_jump: float = 0.15
-    edge_holes: float = 0.5
-    edge_flying: float = 0.1
-    shadow: float = 1.0
-    dark_level: float = 40.0
-    dark_dropout: float = 0.5
-    grazing_deg: float = 75.0
-    grazing_dropout: float = 1.0
+    set_point: Annotated[Real, Bounds("m", ge=0.3, le=10.0)] = 1.5
+    band_near: Annotated[Real, Bounds("m", ge=0.0, le=20.0)] = 1.0
+    band_far: Annotated[Real, Bounds("m", gt=0.0, le=20.0)] = 2.0
+    band_bearing: Annotated[Real, Bounds("rad", gt=0.0, le=math.pi)] = math.radians(30.0)
+    distance_weight: Annotated[Real, Bounds("", ge=0.0, le=1000.0)] = 0.4
+    bearing_weight: Annotated[Real, Bounds("", ge=0.0, le=1000.0)] = 0.4
+    visible_weight: Annotated[Real, Bounds("", ge=0.0, le=1000.0)] = 0.1
+    smoothness_weight: Annotated[Real, Bounds("", ge=0.0, le=1000.0)] = 0.1
+    collision_cost: Annotated[Real, Bounds("", ge=0.0, le=1_000_000.0)] = 1.0
+    distance_scale: Annotated[Real, Bounds("m", gt=0.0, le=100.0)] = 0.5
+    bearing_scale: Annotated[Real, Bounds("rad", gt=0.0, le=10.0)] = 0.35
+    lost_after: Annotated[Real, Bounds("s", gt=0.0, le=1000.0)] = 5.0
+    success_band_share: Annotated[Real, Bounds("", ge=0.0, le=1.0)] = 0.8
+    success_out_of_view: Annotated[Real, Bounds("s", ge=0.0, le=1000.0)] = 1.0
 
     def __post_init__(self) -> None:
-        _require("depth", self, ("axial_noise", "lateral_noise", "disparity_step", "min_range"))
-        _require("depth", self, ("edge_band", "edge_jump"))
-        _require("depth", self, ("baseline", "dark_level"), above_zero=True)
-        _require_shares("depth", self, ("edge_holes", "edge_flying", "shadow", "dark_dropout", "grazing_dropout"))
-        if self.edge_holes + self.edge_flying > 1.0:
+        if not self.band_near <= self.set_point <= self.band_far:
             raise ValueError(
-                f"depth edge_holes, edge_flying are {self.edge_holes!r}, {self.edge_flying!r}; expected a sum up to 1"
-            )
-        if not 0.0 <= self.grazing_deg < 90.0:
-            raise ValueError(f"depth grazing_deg is {self.grazing_deg!r}; expected degrees from 0 to below 90")
-        if not self.min_range < self.max_range:
-            raise ValueError(
-                f"depth min_range, max_range are {self.min_range!r}, {self.max_range!r}; expected min_range < max_range"
+                f"task band_near, set_point, band_far are {self.band_near!r}, {self.set_point!r}, {self.band_far!r}; "
+                "expected near <= set_point <= far in meters"
             )
 
 
-@dataclasses.dataclass(frozen=True)
-class ColorConfig:
-    """Errors of the color camera, applied to the rendered picture.
+@settings("FollowEnv")
+class EnvConfig:
+    """All settings of an environment.
 
-    The defaults are those of a small webcam sensor in a lit room: stated, not measured.
-
-    Attributes:
-        read_noise: standard deviation of the noise in the dark, gray levels.
-        shot_noise: standard deviation of the noise that grows with the root of the light, gray levels at level 1.
-        blur: standard deviation of the Gaussian blur, px at 640 px width.
-        gain: exposure; what exceeds 255 is cut.
-    """
-
-    read_noise: float = 1.0
-    shot_noise: float = 0.12
-    blur: float = 0.6
-    gain: float = 1.0
-
-    def __post_init__(self) -> None:
-        _require("color", self, (field.name for field in dataclasses.fields(self)))
-        if self.blur > 50.0:
-            raise ValueError(f"color blur is {self.blur!r}; expected up to 50 px")
-
-
-@dataclasses.dataclass(frozen=True)
-class FrameConfig:
-    """Loss of whole frames on the way from the camera.
+    Components (scene, route, sensor, robot, outfit) are registered names, mappings `{"name": ..., **settings}` where
+    they have settings, `"module:object"`, or objects. What is given as an object is carried to other processes, but is
+    not JSON-able: `to_json` refuses it in one sentence.
 
     Attributes:
-        drop_share: share of the frames that never arrive, in [0, 1); the first of an episode always does.
+        scene: a name (`follow list scenes`), or a `Scene`.
+        obs: what the policy observes, one of `OBSERVATIONS`; see `FollowEnv`.
+        action: `"twist"` or `"wheels"`.
+        route: how the person moves: a name (`follow list routes`), a mapping with the motion's settings, a
+            `Motion`, or a function (scene, start, generator, speed) -> `Motion`.
+        sensor: errors of the sensors: a name, or a mapping of what differs from `"xtion"` or from its entry `preset`.
+        camera: picture size and field of view.
+        robot: the robot's size, limits and camera mount.
+        renderer: who draws: `"raster"`, `"opengl"`, `"tiny"`, or another registered one.
+        light: a name (`follow list lights`).
+        control_hz: control and camera rate, Hz; divides 240.
+        latency_s: age of what is observed, s; a multiple of the control period.
+        person: body of the person (`follow list bodies`).
+        outfit: what the person wears: a name (`follow list outfits`), or an `Outfit`.
+        walking_speed: of the person between starting and stopping, m/s; a path stays, its times stretch.
+        engine: `"bullet"` (PyBullet's physics) or `"kinematic"` (exact arcs, no PyBullet).
+        task: set point, band, reward weights, ends and success.
     """
 
-    drop_share: float = 0.0
+    scene: Any = "corridor"
+    obs: str = "measurement"
+    action: str = "twist"
+    route: Any = "paper"
+    sensor: SensorConfig = SensorConfig()
+    camera: CameraConfig = CameraConfig()
+    robot: RobotConfig = RobotConfig()
+    renderer: str = "raster"
+    light: str = "normal"
+    control_hz: Annotated[Whole, Bounds("Hz", ge=1, le=PHYSICS_HZ)] = 30
+    latency_s: Annotated[Real, Bounds("s", ge=0.0, le=10.0)] = 0.0
+    person: str = "man"
+    outfit: Any = "blue"
+    walking_speed: Annotated[Real, Bounds("m/s", ge=SLOWEST, le=FASTEST)] = PAPER_SPEED
+    engine: str = "bullet"
+    task: TaskConfig = TaskConfig()
 
     def __post_init__(self) -> None:
-        _require_share_below_one("frames", self, ("drop_share",))
-
-
-@dataclasses.dataclass(frozen=True)
-class BoxConfig:
-    """Jitter of the person's bounding box around the tight box of the visible pixels.
-
-    Attributes:
-        center_jitter: standard deviation of the center's error, as a share of the box's width and height.
-        size_jitter: standard deviation of the relative error of width and height.
-        correlation_s: time constant of the errors (first-order Gauss-Markov), s; 0 = independent from frame to frame.
-        min_pixels: fewer visible pixels than this are not detected.
-    """
-
-    center_jitter: float = 0.03
-    size_jitter: float = 0.04
-    correlation_s: float = 0.1
-    min_pixels: int = 20
-
-    def __post_init__(self) -> None:
-        _require("box", self, (field.name for field in dataclasses.fields(self)))
-
-
-@dataclasses.dataclass(frozen=True)
-class MeasurementConfig:
-    """What a tracker would report, without rendering (`follow_env.camera.measurement`).
-
-    The defaults are what rendered frames give with paper A's depth rule (`follow calibrate`), rounded.
-
-    Attributes:
-        bearing_bias, distance_bias: constant errors, rad and m.
-        bearing_noise, distance_noise: standard deviations of the regular errors, rad and m.
-        bearing_correlation_s, distance_correlation_s: time constants of the regular errors, s; 0 = white.
-        outlier_share: share of the steps in which the distance is an outlier, in [0, 1).
-        outlier_duration_s: mean length of a run of outliers, s; 0 = single steps.
-        outlier_low, outlier_high: the outlier's size is uniform between the two, m (positive = background).
-        miss_share: share of the steps without a measurement although the person is visible, in [0, 1).
-    """
-
-    bearing_bias: float = 0.0
-    bearing_noise: float = 0.019
-    bearing_correlation_s: float = 0.27
-    distance_bias: float = -0.09
-    distance_noise: float = 0.013
-    distance_correlation_s: float = 0.2
-    outlier_share: float = 0.0
-    outlier_duration_s: float = 0.1
-    outlier_low: float = 1.0
-    outlier_high: float = 3.0
-    miss_share: float = 0.0
-
-    def __post_init__(self) -> None:
-        _require_share_below_one("measurement", self, ("outlier_share", "miss_share"))
-        _require("measurement", self, ("bearing_noise", "distance_noise", "outlier_duration_s"))
-        _require("measurement", self, ("bearing_correlation_s", "distance_correlation_s"))
-        for name in ("bearing_bias", "distance_bias"):
-            if not math.isfinite(getattr(self, name)):
-                raise ValueError(f"measurement {name} is {getattr(self, name)!r}; expected a finite value")
-        if not -math.inf < self.outlier_low <= self.outlier_high < math.inf:
+        if PHYSICS_HZ % self.control_hz:
             raise ValueError(
-                f"measurement outlier_low, outlier_high are {self.outlier_low!r}, {self.outlier_high!r}; "
-                "expected finite meters, low <= high"
+                f"control_hz is {self.control_hz!r}; expected a whole number that divides the physics rate "
+                f"{PHYSICS_HZ}, for example 30"
             )
+        if abs(self.delay * self.dt - self.latency_s) > 1e-6:
+            raise ValueError(
+                f"latency_s is {self.latency_s!r}; expected a multiple >= 0 of the control period {self.dt:.4f} s"
+            )
+        choose("obs", self.obs, OBSERVATIONS)
+        choose("action", self.action, ACTIONS)
+        choose("engine", self.engine, ENGINES)
+        choose_components(self)
+
+    @classmethod
+    def of(cls, values: EnvConfig | Mapping[str, Any] | None = None, **changes: Any) -> EnvConfig:
+        """Return the settings of plain data; nested mappings change the defaults.
+
+        Raises:
+            ValueError: for an unknown setting (the nearest is named) or an impossible value, in one sentence.
+        """
+        base = values if isinstance(values, EnvConfig) else cls()
+        if values is not None and not isinstance(values, EnvConfig | Mapping):
+            raise ValueError(f"the environment's config is {values!r}; expected an EnvConfig or a mapping of settings")
+        wanted = {**(values if isinstance(values, Mapping) else {}), **changes}
+        if not wanted:
+            return base
+        made: dict[str, Any] = {}
+        for name, value in wanted.items():
+            choose("FollowEnv setting", name, [field.name for field in dataclasses.fields(cls)])
+            default = getattr(base, name)
+            if name == "sensor":
+                made[name] = sensor_config(value, base.sensor)
+            elif name == "robot" and isinstance(value, str | Mapping):
+                made[name] = robot_config(value, base.robot)
+            elif dataclasses.is_dataclass(default) and name in ("camera", "robot", "task"):
+                made[name] = build(name, default, value)
+            else:
+                made[name] = value
+        return dataclasses.replace(base, **made)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the settings as plain data; `EnvConfig.of` makes them again.
+
+        Raises:
+            ValueError: for a component given as an object, which JSON cannot carry; give `"module:object"`.
+        """
+        data = to_data(self)
+        for name in ("scene", "route", "outfit"):
+            if not isinstance(data[name], str | dict):
+                raise ValueError(
+                    f"{name} is an object, {type(data[name]).__name__}, which JSON cannot carry; expected a registered "
+                    "name or 'module:object'"
+                )
+        return data
+
+    @property
+    def dt(self) -> float:
+        """Control period, s."""
+        return 1.0 / self.control_hz
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps in a control period."""
+        return PHYSICS_HZ // self.control_hz
+
+    @property
+    def delay(self) -> int:
+        """Control steps of latency."""
+        return round(self.latency_s * self.control_hz)
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """The pinhole of the pictures."""
+        return self.camera.intrinsics
+
+    @property
+    def mount(self) -> CameraMount:
+        """Where the camera sits on the robot."""
+        return self.robot.mount
 
 
-@dataclasses.dataclass(frozen=True)
-class SensorConfig:
-    """All sensor errors.
+def robot_config(value: str | Mapping[str, Any], base: RobotConfig) -> RobotConfig:
+    """Return the robot that `value` names, or `base` with the settings of a mapping replaced.
 
-    `depth`, `color`, `frames` and `box` act on rendered frames, `measurement` on the `measurement` observation.
+    A mapping changes `base`, or the robot that its entry `preset` names.
     """
+    from follow_env.world.robots import ROBOTS
 
-    depth: DepthConfig = DepthConfig()
-    color: ColorConfig = ColorConfig()
-    frames: FrameConfig = FrameConfig()
-    box: BoxConfig = BoxConfig()
-    measurement: MeasurementConfig = MeasurementConfig()
-
-
-IDEAL_SENSOR = SensorConfig(
-    DepthConfig(
-        axial_noise=0.0,
-        lateral_noise=0.0,
-        disparity_step=0.0,
-        min_range=0.0,
-        max_range=math.inf,
-        edge_band=0,
-        shadow=0.0,
-        dark_dropout=0.0,
-        grazing_dropout=0.0,
-    ),
-    ColorConfig(read_noise=0.0, shot_noise=0.0, blur=0.0),
-    FrameConfig(),
-    BoxConfig(center_jitter=0.0, size_jitter=0.0),
-    MeasurementConfig(bearing_noise=0.0, distance_bias=0.0, distance_noise=0.0),
-)
-"""No errors at all."""
-HARSH_SENSOR = SensorConfig(
-    DepthConfig(
-        axial_noise=2.0,
-        lateral_noise=1.6,
-        min_range=0.8,
-        max_range=5.0,
-        edge_band=2,
-        edge_holes=0.6,
-        edge_flying=0.3,
-        dark_level=80.0,
-        dark_dropout=0.9,
-        grazing_deg=60.0,
-    ),
-    ColorConfig(read_noise=4.0, shot_noise=0.4, blur=2.0, gain=0.6),
-    FrameConfig(drop_share=0.1),
-    BoxConfig(center_jitter=0.06, size_jitter=0.08),
-    MeasurementConfig(bearing_noise=0.024, distance_noise=0.03, outlier_share=0.05, miss_share=0.1),
-)
-"""A bad day: sunlight on the pattern, dim light for the colors, a busy bus. Stated, not measured: about twice the
-noise, half the range, one frame in ten lost."""
-SENSORS = {"xtion": SensorConfig(), "xtion_harsh": HARSH_SENSOR, "ideal": IDEAL_SENSOR}
-"""Named sensors."""
-
-
-def build(what: str, base: T, data: Mapping[str, Any] | None) -> T:
-    """Return `base` (a settings dataclass) with the entries of `data` replaced, nested settings included.
-
-    Raises:
-        ValueError: for an unknown key (names the nearest) or a value of the wrong type or range.
-    """
-    if data is None:
-        return base
-    if not isinstance(data, Mapping):
-        raise ValueError(f"{what} is {data!r}; expected a mapping of settings, for example {{}}")
-    changes: dict[str, Any] = {}
-    for key, value in data.items():
-        choose(f"{what} setting", key, [field.name for field in dataclasses.fields(base)])  # type: ignore[arg-type]
-        default = getattr(base, key)
-        if dataclasses.is_dataclass(default):
-            changes[key] = build(f"{what}.{key}", default, value)
-            continue
-        numeric = isinstance(value, numbers.Real) and not isinstance(value, bool) and not math.isnan(value)
-        if not numeric or (isinstance(default, int) and (math.isinf(value) or value != int(value))):
-            raise ValueError(f"{what}.{key} is {value!r}; expected a number like the default {default!r}")
-        changes[key] = type(default)(value)
-    return dataclasses.replace(base, **changes)  # type: ignore[type-var]
-
-
-def sensor_config(value: str | Mapping[str, Any] | SensorConfig) -> SensorConfig:
-    """Return the sensor that `value` names, or one with the settings of a mapping replaced.
-
-    A mapping changes the default sensor, or the one that its entry `preset` names.
-    """
-    if isinstance(value, SensorConfig):
-        return value
     if isinstance(value, str):
-        return SENSORS[choose("sensor", value, SENSORS)]
-    if isinstance(value, Mapping) and "preset" in value:
-        changes = {key: setting for key, setting in value.items() if key != "preset"}
-        return build("sensor", SENSORS[choose("sensor preset", value["preset"], SENSORS)], changes)
-    return build("sensor", SensorConfig(), value)
+        if value not in ROBOTS and ":" not in value:
+            choose("robot", value, ROBOTS.names())
+        return ROBOTS.get(value)
+    if "preset" in value:
+        base = ROBOTS.get(value["preset"])
+    return build("robot", base, {key: setting for key, setting in value.items() if key != "preset"})
+
+
+def choose_components(config: EnvConfig) -> None:
+    """Raise a ValueError that names the nearest for a component's name that nobody registered."""
+    from follow_env.camera import RENDERERS
+    from follow_env.world.people.bodies import BODIES, OUTFITS, Outfit
+
+    for what, value, registry in (
+        ("renderer", config.renderer, RENDERERS),
+        ("person", config.person, BODIES),
+        ("outfit", config.outfit, OUTFITS),
+    ):
+        if not isinstance(value, Outfit) and not (isinstance(value, str) and ":" in value):
+            choose(what, value, registry)

@@ -17,7 +17,8 @@ from typing import Any
 from baselines.benchmark.cells import ENVIRONMENT_IDS, Cell, family_cells, rule_cells, sensitivity_cells, table1_cells
 from baselines.benchmark.executors.processes import Keyed
 from baselines.benchmark.metrics import episode as metrics
-from follow_env.config import CameraConfig, RobotConfig, SensorConfig
+from follow_env.config import CameraConfig, RobotConfig
+from follow_env.sensors import SensorConfig
 
 EPISODES = {"truth": 100, "emulated": 100, "mask": 20, "detector": 20}
 """Episodes per cell of Table 1 unless told otherwise, by perception: a rendered episode costs far more."""

@@ -22,7 +22,7 @@ def evaluate(agent: Agent, seeds: Iterable[int]) -> dict[str, float]:
     seeds, rows = list(seeds), []
     for scene in SCENES:
         camera = PICTURE if agent.observation == "rgbd_uint8" else None
-        env = FollowEnv(scene, obs=agent.observation, camera=camera)
+        env = FollowEnv(scene=scene, obs=agent.observation, camera=camera)
         cell = Cell("emulated", scene, "none", controller=agent.name, sensor="default")
         rows += [play(env, agent.in_scene(scene), cell, seed).row for seed in seeds]
         env.close()

@@ -38,13 +38,13 @@ class StepCost:
 def measure_steps(scene: str, steps: int, resets: int) -> list[StepCost]:
     """Return what steps and resets cost in a scene, `steps` and `resets` single ones of each kind."""
     envs = {
-        "step, obs=measurement": FollowEnv(scene),
-        "step, obs=measurement, with AKF + PI": FollowEnv(scene),
-        "step, obs=rgbd 320x240": FollowEnv(scene, obs="rgbd", camera={"width": 320, "height": 240}),
-        "step, obs=rgbd_uint8 84x84": FollowEnv(scene, obs="rgbd_uint8", camera={"width": 84, "height": 84}),
+        "step, obs=measurement": FollowEnv(scene=scene),
+        "step, obs=measurement, with AKF + PI": FollowEnv(scene=scene),
+        "step, obs=rgbd 320x240": FollowEnv(scene=scene, obs="rgbd", camera={"width": 320, "height": 240}),
+        "step, obs=rgbd_uint8 84x84": FollowEnv(scene=scene, obs="rgbd_uint8", camera={"width": 84, "height": 84}),
     }
     first = next(iter(envs.values()))
-    world = World(first.scene, first.robot_config)
+    world = World(first.scene, first.config.robot)
     operations: dict[str, Callable[[], object]] = {BARE: _roll(world)}
     for what, env in envs.items():
         operations[what] = _follow(env, scene) if "AKF" in what else _drive(env)
@@ -72,7 +72,7 @@ def _roll(world: World) -> Callable[[], object]:
 def _drive(env: FollowEnv) -> Callable[[], object]:
     """Return a function that takes one step with a constant action, whatever happens."""
     env.reset(seed=0)
-    action = np.array((SPEED / env.robot_config.max_speed, 0.0), np.float32)
+    action = np.array((SPEED / env.config.robot.max_speed, 0.0), np.float32)
 
     def step() -> None:
         _, _, terminated, truncated, _ = env.step(action)

@@ -136,7 +136,7 @@ def _drives(scene: str, seeds: Sequence[int]) -> Iterable[tuple[NDArray[np.float
     """Yield the poses (n + 1, 3) and the n rim-speed commands of closed-loop episodes with PyBullet."""
     cell = Cell("emulated", scene, "akf")
     env, policy = FollowEnv(**environment_kwargs(cell)), driver(cell)
-    drive = DiffDrive(env.robot_config)
+    drive = DiffDrive(env.config.robot)
     for seed in seeds:
         observation, info = env.reset(seed=seed)
         poses, commands, state, done = [info["robot_pose"]], [], None, False

@@ -20,7 +20,7 @@ from baselines.benchmark.statistics import Score
 from baselines.benchmark.store import Store
 from baselines.followers.agents import shipped, weights_file
 from baselines.papers.dong2018.report import markdown_table
-from follow_env.world.motion.routes import PAPER_SPEED
+from follow_env.world.motion.profile import PAPER_SPEED
 
 EPISODES = 100
 WALKING_SPEEDS = (0.5, 0.7, 1.1)

@@ -63,7 +63,7 @@ def watch(
     env = FollowEnv(**{**environment_kwargs(cell), "camera": picture_size, "renderer": renderer})
     view = None if size is None else _make_view(renderer, env.scene, env.camera.config, size, shadows)
     title = f"{cell.scene}, {cell.perception}, {cell.estimator} + PI"
-    dashboard = Dashboard(env.scene, env.camera, env.robot_config.camera_forward, title)
+    dashboard = Dashboard(env.scene, env.camera, env.config.robot.camera_forward, title)
     policy, state = driver(cell, picture_size), None
     observation, info = env.reset(seed=seed)
     small: list[np.ndarray] = []

@@ -1,17 +1,15 @@
 """The RGB-D camera: `PinholeCamera`, `RGBDFrame`, the `Renderer` interface and the depth sensor's errors."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from follow_env.camera.frame import RGBDFrame
 from follow_env.camera.pinhole import CameraPose, PinholeCamera
-from follow_env.registry import choose
+from follow_env.registry import Registry
 from follow_env.world.people.mesh import Placed
 from follow_env.world.scene import Scene
 
 __all__ = ["RENDERERS", "CameraPose", "PinholeCamera", "RGBDFrame", "Renderer", "make_renderer"]
-
-RENDERERS = ("raster", "tiny", "opengl")
 
 
 class Renderer(Protocol):
@@ -24,17 +22,31 @@ class Renderer(Protocol):
         """Free what the renderer holds; a second call does nothing."""
 
 
-def make_renderer(name: str, scene: Scene, camera: PinholeCamera) -> Renderer:
-    """Return the renderer `name`; a ValueError names the nearest when there is none, or what this machine lacks."""
-    choose("renderer", name, RENDERERS)
-    if name == "tiny":
-        from follow_env.camera.tiny import TinyRenderer
+RENDERERS: Registry[Callable[[Scene, PinholeCamera], Renderer]] = Registry("renderer")
+"""Functions (scene, camera) that make a `Renderer`, or say in one sentence what this machine lacks."""
 
-        return TinyRenderer(scene, camera)
-    if name == "opengl":
-        from follow_env.camera.opengl.renderer import OpenGLRenderer
 
-        return OpenGLRenderer(scene, camera)
+@RENDERERS.register("raster")
+def _raster(scene: Scene, camera: PinholeCamera) -> Renderer:
     from follow_env.camera.raster.renderer import RasterRenderer
 
     return RasterRenderer(scene, camera)
+
+
+@RENDERERS.register("tiny")
+def _tiny(scene: Scene, camera: PinholeCamera) -> Renderer:
+    from follow_env.camera.tiny import TinyRenderer
+
+    return TinyRenderer(scene, camera)
+
+
+@RENDERERS.register("opengl")
+def _opengl(scene: Scene, camera: PinholeCamera) -> Renderer:
+    from follow_env.camera.opengl.renderer import OpenGLRenderer
+
+    return OpenGLRenderer(scene, camera)
+
+
+def make_renderer(name: str, scene: Scene, camera: PinholeCamera) -> Renderer:
+    """Return the renderer `name`; a ValueError names the nearest when there is none, or what this machine lacks."""
+    return RENDERERS.get(name)(scene, camera)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from follow_env.config import MeasurementConfig
+from follow_env.sensors import MeasurementConfig
 
 
 class ErrorModel(NamedTuple):

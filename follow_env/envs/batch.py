@@ -16,11 +16,12 @@ from gymnasium.vector.utils import batch_space
 
 from follow_env.camera.pinhole import PinholeCamera
 from follow_env.compilation import announced
+from follow_env.config import EnvConfig
+from follow_env.domain import Domain
 from follow_env.envs.kinematic.episodes import Episodes
 from follow_env.envs.kinematic.kernels import BEGIN, SKIP, STEP, play
 from follow_env.envs.kinematic.pictures import Pictures
 from follow_env.envs.kinematic.records import INFO, WORLD
-from follow_env.envs.kinematic.standin import Domain, EnvConfig
 from follow_env.envs.observations import observation_space
 from follow_env.envs.task import REWARD_TERMS
 from follow_env.registry import choose

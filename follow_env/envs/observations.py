@@ -9,7 +9,6 @@ from gymnasium import spaces
 from follow_env.camera import PinholeCamera
 from follow_env.config import RobotConfig
 
-OBSERVATIONS = ("measurement", "state", "rgbd", "rgbd_box", "rgbd_uint8")
 MAX_DISTANCE = 20.0
 """Largest distance that an observation can hold, m."""
 

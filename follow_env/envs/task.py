@@ -1,8 +1,8 @@
 """What good following is: bounded reward terms (they stand in `info["rewards"]`), the ends and the rule for success."""
 
-import math
-from dataclasses import dataclass
 from typing import Any
+
+from follow_env.config import TaskConfig
 
 REWARD_TERMS = ("distance", "bearing", "visible", "smoothness", "collision")
 """Names of what `reward_terms` returns, in order."""
@@ -10,38 +10,8 @@ TIME_ROUNDING = 1e-9
 """Times that differ by less are the same, s."""
 
 
-@dataclass(frozen=True)
-class TaskConfig:
-    """What is asked of the robot, and what it is worth.
-
-    Attributes:
-        set_point: following distance that is rewarded, m (paper B, section 3); the bearing's set point is 0 rad.
-        band_distance: in band, the distance lies between these, m ...
-        band_bearing: ... and |bearing| is at most this, rad.
-        distance_weight, bearing_weight, visible_weight, smoothness_weight: largest value of each reward term.
-        collision_cost: what a collision takes off.
-        distance_scale, bearing_scale: errors at which half of a term is left, m and rad.
-        lost_after: the episode ends when the person was out of view for longer than this, s.
-        success_band_share: an episode succeeds without collision, in band for at least this share of its steps ...
-        success_out_of_view: ... and with the person never out of view for longer than this, s.
-    """
-
-    set_point: float = 1.5
-    band_distance: tuple[float, float] = (1.0, 2.0)
-    band_bearing: float = math.radians(30.0)
-    distance_weight: float = 0.4
-    bearing_weight: float = 0.4
-    visible_weight: float = 0.1
-    smoothness_weight: float = 0.1
-    collision_cost: float = 1.0
-    distance_scale: float = 0.5
-    bearing_scale: float = 0.35
-    lost_after: float = 5.0
-    success_band_share: float = 0.8
-    success_out_of_view: float = 1.0
-
-
-SET_POINT, BAND_DISTANCE, BAND_BEARING = TaskConfig.set_point, TaskConfig.band_distance, TaskConfig.band_bearing
+SET_POINT, BAND_BEARING = TaskConfig.set_point, TaskConfig.band_bearing
+BAND_DISTANCE = TaskConfig.band_near, TaskConfig.band_far
 SUCCESS_BAND_SHARE, SUCCESS_OUT_OF_VIEW = TaskConfig.success_band_share, TaskConfig.success_out_of_view
 """Of the paper's task."""
 
@@ -85,7 +55,7 @@ def total(terms: tuple[float, float, float, float, float]) -> float:
 
 def in_band(task: Any, bearing: float, distance: float) -> bool:
     """Whether the robot follows at about the right distance with the person about ahead."""
-    return bool(task.band_distance[0] <= distance <= task.band_distance[1] and abs(bearing) <= task.band_bearing)
+    return bool(task.band_near <= distance <= task.band_far and abs(bearing) <= task.band_bearing)
 
 
 def ends(task: Any, collided: bool, out_of_view: float, time: float, duration: float) -> tuple[bool, bool]:

@@ -221,27 +221,30 @@ class World:
         )
 
     def _add_robot(self) -> int:
-        """Build the robot; base frame = the chassis' center of mass, 5 cm behind the axle, 10 cm above the floor."""
+        """Build the robot; base frame = the chassis' center of mass, the middle of its box."""
         client, radius, half_track = self._client, self.config.wheel_radius, 0.5 * self.config.track_width
-        chassis = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX, halfExtents=(0.15, 0.11, 0.05), physicsClientId=client
-        )
+        body = self.config.body
+        middle, center = body.chassis_middle, body.chassis_center
+        half = (0.5 * body.chassis_length, 0.5 * body.chassis_width, 0.5 * body.chassis_height)
+        chassis = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
         wheel = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=radius, physicsClientId=client)
-        caster = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=0.03, physicsClientId=client)
-        mast = pybullet.createCollisionShape(pybullet.GEOM_CYLINDER, radius=0.03, height=0.80, physicsClientId=client)
+        caster = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=body.caster_radius, physicsClientId=client)
+        mast = pybullet.createCollisionShape(
+            pybullet.GEOM_CYLINDER, radius=body.mast_radius, height=body.mast_height, physicsClientId=client
+        )
         upright = (0.0, 0.0, 0.0, 1.0)
         robot = pybullet.createMultiBody(
-            baseMass=8.0,
+            baseMass=body.chassis_mass,
             baseCollisionShapeIndex=chassis,
-            basePosition=(-0.05, 0.0, 0.10),
-            linkMasses=[0.5, 0.5, 0.2, 0.4],
+            basePosition=(middle, 0.0, center),
+            linkMasses=[body.wheel_mass, body.wheel_mass, body.caster_mass, body.mast_mass],
             linkCollisionShapeIndices=[wheel, wheel, caster, mast],
             linkVisualShapeIndices=[-1] * 4,
             linkPositions=[
-                (0.05, half_track, radius - 0.10),
-                (0.05, -half_track, radius - 0.10),
-                (-0.13, 0.0, 0.03 - 0.10),
-                (-0.02, 0.0, 0.46),
+                (-middle, half_track, radius - center),
+                (-middle, -half_track, radius - center),
+                (body.caster_offset, 0.0, body.caster_radius - center),
+                (body.mast_offset, 0.0, body.mast_rise),
             ],
             linkOrientations=[upright] * 4,
             linkInertialFramePositions=[(0.0, 0.0, 0.0)] * 4,

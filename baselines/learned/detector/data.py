@@ -12,14 +12,15 @@ import cv2
 import numpy as np
 
 from baselines.learned.detector.augment import disturb, draw_backdrop
-from baselines.learned.detector.random_people import Look, draw_look, draw_posture
+from baselines.learned.detector.random_people import DRAWN_BODIES, Look, draw_look, draw_posture
 from baselines.learned.detector.random_scenes import draw_scene
 from follow_env.camera.frame import RGBDFrame
 from follow_env.camera.pinhole import CameraPose, PinholeCamera
 from follow_env.camera.raster.renderer import RasterRenderer
 from follow_env.camera.sensor.errors import RGBDSensor
-from follow_env.config import IDEAL_SENSOR, CameraConfig, DepthConfig
-from follow_env.world.people.bodies import BODIES, DETAILS, load_body
+from follow_env.config import CameraConfig
+from follow_env.sensors import IDEAL_SENSOR, DepthConfig
+from follow_env.world.people.bodies import DETAILS, load_body
 from follow_env.world.people.mesh import Placed
 from follow_env.world.people.walker import Walker
 from follow_env.world.scene import Scene
@@ -117,7 +118,7 @@ class SampleSource:
         square = PinholeCamera(CameraConfig(width=INPUT_SIZE, height=INPUT_SIZE, hfov_deg=CAMERA.hfov_deg))
         self._sensor = RGBDSensor(DepthConfig(), IDEAL_SENSOR.color, square)
         self._walkers = {
-            (name, detail): Walker(load_body(name, detail=detail)) for name in BODIES for detail in DETAILS
+            (name, detail): Walker(load_body(name, detail=detail)) for name in DRAWN_BODIES for detail in DETAILS
         }
         self._group = -1
         self._scene: Scene

@@ -30,8 +30,9 @@ from baselines.followers.build import make_estimator
 from baselines.followers.follower import Follower
 from baselines.followers.perception import make_perception, perceive_measurement, perceive_state
 from baselines.papers.dong2018.table1 import PAPER_RMSE
-from follow_env.config import CameraConfig, MeasurementConfig
+from follow_env.config import CameraConfig
 from follow_env.envs.follow import FollowEnv
+from follow_env.sensors import MeasurementConfig
 from tracker.depth import RULES, Rule
 from tracker.estimators import LockOutWarning, NoFilter
 from tracker.estimators.base import NoiseModel
@@ -114,7 +115,7 @@ def truth_observation(info: dict[str, Any]) -> np.ndarray:
 
 def _frame_errors(scene: str, seed: int) -> dict[str, Samples]:
     """Play an episode by the truth; return the errors of each depth rule on its frames."""
-    env, driver, state = FollowEnv(scene, obs="rgbd_box", camera=CAMERA), truth_driver(), None
+    env, driver, state = FollowEnv(scene=scene, obs="rgbd_box", camera=CAMERA), truth_driver(), None
     rules = {rule: make_perception("mask", CameraConfig(**CAMERA), rule=cast(Rule, rule)) for rule in RULES}
     errors: dict[str, Samples] = {rule: [] for rule in rules}
     observation, info = env.reset(seed=seed)
@@ -255,7 +256,7 @@ def _fit(shape: MeasurementConfig, bearing_rmse: float, distance_rmse: float) ->
 
 def _unmodeled_motion(scene: str, seed: int) -> tuple[float, float, float, float]:
     """Return the largest |rate| and |acceleration| per axis that the robot's twist does not explain in an episode."""
-    env, driver, state = FollowEnv(scene, obs="state"), truth_driver(), None
+    env, driver, state = FollowEnv(scene=scene, obs="state"), truth_driver(), None
     observation, info = env.reset(seed=seed)
     rates: list[tuple[float, float]] = []
     ended = False
@@ -320,7 +321,7 @@ def _smallest_multiples(
     every: int,
 ) -> tuple[tuple[float, float], list[int], list[float]]:
     """Raise the multiple of the estimator's own noise per axis until it inflates fewer than 2 alpha of the steps."""
-    env = FollowEnv(scene, sensor={"measurement": dataclasses.asdict(clean)})
+    env = FollowEnv(scene=scene, sensor={"measurement": dataclasses.asdict(clean)})
     multiples = [1, 1]
     unit = process if estimator == "akf" else acceleration
     while True:

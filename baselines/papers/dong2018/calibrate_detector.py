@@ -66,7 +66,7 @@ def tracked_errors(detector: Detector, scene: str, seed: int) -> Samples:
 
     The frames of a confirmation, in which nothing can be accepted, are left out.
     """
-    env = FollowEnv(scene, obs="rgbd", camera=CAMERA)
+    env = FollowEnv(scene=scene, obs="rgbd", camera=CAMERA)
     driver, state = truth_driver(), None
     camera, robot = CameraConfig(**CAMERA), RobotConfig()
     intrinsics = Intrinsics.from_hfov(camera.width, camera.height, math.radians(camera.hfov_deg))

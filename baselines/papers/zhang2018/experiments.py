@@ -9,9 +9,9 @@ from pathlib import Path
 
 from baselines.benchmark.files import Value
 from baselines.papers.zhang2018 import lookalike, rectangle, table2
+from baselines.papers.zhang2018.sequences import POSTURES
 from baselines.papers.zhang2018.sequences import Sequence as Film
 from baselines.papers.zhang2018.table2 import OURS
-from follow_env.world.people.walker import POSTURES
 from tracker.person_tracker import Detector
 
 Row = Mapping[str, Value]

@@ -15,7 +15,8 @@ from baselines.benchmark.store import Store
 from baselines.papers.zhang2018 import lookalike, rectangle, script, stage, table2
 from baselines.papers.zhang2018.experiments import EPISODES, EXPERIMENTS, Detectors, Part, Player, Rows, tasks
 from baselines.papers.zhang2018.table2 import OURS, SSD
-from follow_env.config import CameraConfig, SensorConfig
+from follow_env.config import CameraConfig
+from follow_env.sensors import SensorConfig
 from tracker.detection.detector import CONFIDENCE
 
 FIGURES = "figures"

@@ -20,13 +20,13 @@ import numpy as np
 from numpy.random import Generator
 
 from baselines.papers.zhang2018.stage import CAMERA, PERIOD
-from follow_env.world.people.bodies import BODIES, SUITS, load_body
+from follow_env.world.people.bodies import SUITS, load_body
 from follow_env.world.people.mesh import Placed
 from follow_env.world.people.walker import Walker
 
 TARGET, OTHER = 1, 2
 """Ids of the two."""
-ADULTS = tuple(body for body in BODIES if body != "child")
+ADULTS = ("man", "man_tall", "man_heavy", "woman", "woman_slim", "woman_old")
 POSTURES = ("walk", "bent", "arms_raised")
 """Of the target: standing or stepping about, bent over its work, arms raised."""
 REACH = 0.5

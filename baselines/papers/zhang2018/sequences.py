@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from follow_env.camera import CameraPose, PinholeCamera, RGBDFrame
 from follow_env.camera.raster.renderer import RasterRenderer
 from follow_env.camera.sensor.errors import RGBDSensor
-from follow_env.config import CameraConfig, SensorConfig
+from follow_env.config import CameraConfig
+from follow_env.sensors import SensorConfig
 from follow_env.world.people.bodies import SUITS, load_body
-from follow_env.world.people.walker import POSTURES, Walker
+from follow_env.world.people.walker import Walker
 from follow_env.world.scenes import make_scene
 from tracker.metrics import DetectionCounts, count_detections
 from tracker.person_tracker import Detector
@@ -27,6 +28,9 @@ SUBJECT = (0.9, 0.0)
 """Where the subject turns, m."""
 TURNS = 1.0
 """Turns in each posture."""
+
+POSTURES = ("walk", "stand", "crouch", "arms_raised", "sideways", "bent", "floating", "head_down")
+"""The postures that Table 2 shows, one after the other: a new posture of the package changes no sequence."""
 
 
 @dataclass(frozen=True)

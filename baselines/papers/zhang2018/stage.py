@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from follow_env.camera.pinhole import CameraPose, PinholeCamera
 from follow_env.camera.raster.renderer import RasterRenderer
 from follow_env.camera.sensor.errors import RGBDSensor
-from follow_env.config import CameraConfig, SensorConfig
+from follow_env.config import CameraConfig
 from follow_env.geometry import XTION_PRO
+from follow_env.sensors import SensorConfig
 from follow_env.world.people.mesh import Placed
 from follow_env.world.scenes import make_scene
 from tracker.boxes import Detection

@@ -13,9 +13,8 @@ import numpy as np
 
 from baselines.benchmark.files import Value
 from baselines.papers.dong2018.report import markdown_table
-from baselines.papers.zhang2018.sequences import TABLE_2, play
+from baselines.papers.zhang2018.sequences import POSTURES, TABLE_2, play
 from baselines.papers.zhang2018.sequences import Sequence as Film
-from follow_env.world.people.walker import POSTURES
 from tracker.depth import Box
 from tracker.metrics import DetectionCounts, count_detections
 from tracker.person_tracker import Detector

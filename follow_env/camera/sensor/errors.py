@@ -19,7 +19,7 @@ from follow_env.camera.sensor.kernels import (
     pack_bytes,
 )
 from follow_env.compilation import announced
-from follow_env.config import ColorConfig, DepthConfig
+from follow_env.sensors import ColorConfig, DepthConfig
 
 NATIVE_WIDTH = 640
 """Width of the sensor's own picture, px: dials in pixels refer to it unless they say otherwise."""

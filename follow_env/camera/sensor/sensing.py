@@ -7,7 +7,7 @@ import numpy as np
 from follow_env.camera import PinholeCamera, RGBDFrame
 from follow_env.camera.measurement import GaussMarkov
 from follow_env.camera.sensor.errors import RGBDSensor
-from follow_env.config import BoxConfig, SensorConfig
+from follow_env.sensors import BoxConfig, SensorConfig
 
 
 class RGBDSensing:

@@ -9,15 +9,16 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from follow_env.camera.measurement import ErrorModel
+from follow_env.config import EnvConfig
 from follow_env.envs.kinematic.records import SETTINGS, TABLE_COLUMNS, TASK
-from follow_env.envs.kinematic.standin import EnvConfig, make_motion, motion_table
 from follow_env.envs.observations import largest_twist
 from follow_env.world.kinematic.drive import kept_speed_error
 from follow_env.world.kinematic.hull import pack_hull
 from follow_env.world.kinematic.place import pack_place
 from follow_env.world.kinematic.route import KERNEL_ROUTES
 from follow_env.world.kinematic.world import check_torque
-from follow_env.world.motion.routes import PAPER_SPEED, choose_route
+from follow_env.world.motion.base import MOTIONS, check_motion, make_motion, motion_table
+from follow_env.world.motion.profile import PAPER_SPEED
 from follow_env.world.people.dimensions import CHEST_HEIGHT
 from follow_env.world.scenes import make_scene
 
@@ -169,14 +170,13 @@ class Episodes:
 
     def _check_route(self, route: Any) -> None:
         """Raise a ValueError for a route that nobody can walk here; names are looked up once."""
-        name = route["name"] if isinstance(route, Mapping) else route
-        if not isinstance(name, str) or name in self._known_routes:
+        key = MOTIONS.parts(route)[0] if isinstance(route, str | Mapping) else repr(route)
+        if key in self._known_routes:
             return
-        if name == "commanded":
+        if key == "commanded":
             raise ValueError("route 'commanded' needs somebody who leads each person; expected another one in a batch")
-        if ":" not in name:
-            choose_route(name, self.scene)
-        self._known_routes.add(name)
+        check_motion(route, self.scene, self.nominal.task.set_point, self.nominal.walking_speed)
+        self._known_routes.add(key)
 
     @staticmethod
     def _in_kernel(route: Any) -> bool:

@@ -20,7 +20,7 @@ def _sources() -> list[Path]:
     own = [
         path
         for path in Path(__file__).parent.glob("*.py")
-        if path.stem not in ("render_worlds", "pictures", "episodes", "standin")
+        if path.stem not in ("render_worlds", "pictures", "episodes")
     ]
     world = [*package.glob("world/kinematic/*.py"), *package.glob("world/motion/*.py"), package / "world/clearance.py"]
     parts = "world/clock", "world/people/dimensions", "world/robots/diff_drive", "camera/measurement"

@@ -11,10 +11,10 @@ from follow_env.camera.pinhole import CameraPose, PinholeCamera
 from follow_env.camera.raster.scene import ScenePack, pack_scene
 from follow_env.camera.raster.work import make_view, make_workspace, pack_people
 from follow_env.camera.sensor.errors import RGBDSensor
+from follow_env.config import EnvConfig
 from follow_env.envs.kinematic.episodes import Episodes
 from follow_env.envs.kinematic.kernels import BEGIN, SKIP, STEP
 from follow_env.envs.kinematic.render_worlds import Canvas, Studio, paint
-from follow_env.envs.kinematic.standin import EnvConfig
 from follow_env.world.people.bodies import load_body
 from follow_env.world.people.walker import Walker
 from follow_env.world.scenes import make_scene

@@ -3,7 +3,7 @@
 import numpy as np
 
 from follow_env.camera.measurement import ErrorModel
-from follow_env.envs.task import TaskConfig
+from follow_env.config import TaskConfig
 from follow_env.world.kinematic.hull import HULL
 from follow_env.world.kinematic.route import MOST_TURNS
 

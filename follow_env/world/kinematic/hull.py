@@ -25,9 +25,12 @@ along x, between two heights); all of it within `reach` of the axle's middle, m.
 def pack_hull(robot: RobotConfig) -> tuple[float, ...]:
     """Return the numbers of a robot's `HULL`."""
     half_track, wheel_radius = 0.5 * robot.track_width, robot.wheel_radius
-    middle, length, width, low, high = -0.05, 0.15, 0.11, 0.05, 0.15
-    caster, caster_radius = -0.18, 0.03
-    mast, mast_radius, mast_low, mast_high = -0.07, 0.03, 0.16, 0.96
+    body = robot.body
+    middle, length, width = body.chassis_middle, 0.5 * body.chassis_length, 0.5 * body.chassis_width
+    low, high = body.chassis_low, body.chassis_low + body.chassis_height
+    caster, caster_radius = middle + body.caster_offset, body.caster_radius
+    mast, mast_radius, center = middle + body.mast_offset, body.mast_radius, body.chassis_center + body.mast_rise
+    mast_low, mast_high = center - 0.5 * body.mast_height, center + 0.5 * body.mast_height
     reach = max(
         math.sqrt((abs(middle) + length) ** 2 + width * width),
         abs(caster) + caster_radius,

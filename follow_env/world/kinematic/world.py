@@ -108,7 +108,7 @@ class KinematicWorld:
 
 def check_torque(config: RobotConfig) -> None:
     """Raise a ValueError if the robot has a torque limit of its own, which no kinematic robot can keep."""
-    if config.max_wheel_torque != RobotConfig().max_wheel_torque:
+    if config.max_wheel_torque != RobotConfig.max_wheel_torque:
         raise ValueError(
             f"robot max_wheel_torque is {config.max_wheel_torque!r}, but the kinematic engine knows no torque; "
             "leave it out or take engine='bullet'"

@@ -2,6 +2,11 @@
 
 import math
 
+PAPER_SPEED = 12.0 / 13.0
+"""Walking speed of paper B's routes between starting and stopping, m/s: 12 m in 14 s with ramps of 1 s."""
+SLOWEST, FASTEST = 0.2, 2.0
+"""Walking speeds that a person can have, m/s: a shuffle and a jog."""
+
 
 def speed_at(t: float, cruise: float, duration: float, ramp: float) -> float:
     """Return the walking speed at time t, m/s.

@@ -8,15 +8,13 @@ not depend on the control rate.
 import math
 import numbers
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from follow_env.envs.task import SET_POINT
-from follow_env.registry import choose
-from follow_env.world.motion.profile import speed_at, turned_at, walked_at
+from follow_env.world.motion.base import MOTIONS, Pose
+from follow_env.world.motion.profile import PAPER_SPEED, speed_at, turned_at, walked_at
 from follow_env.world.scene import Scene
 
 TABLE_STEP = 0.1
@@ -30,6 +28,9 @@ CORNER_CUT = 0.15
 
 SMALLEST_TURN, LARGEST_TURN = math.radians(20.0), math.radians(50.0)
 """Paper B's limits on a turn; the larger one also on the heading against the start, rad."""
+
+MOST_TURNS = 6
+"""More turns than this do not fit into 12 m."""
 
 EARLIEST_TURN, LATEST_TURN = 1.5, 12.0
 """Between these a turn of the paper's routes begins, s."""
@@ -45,12 +46,6 @@ ATTEMPTS = 1000
 
 OUTLINE_STEP = 0.4
 """An outline is sampled this often, m of the way."""
-
-PAPER_SPEED = 12.0 / 13.0
-"""Walking speed of paper B's routes between starting and stopping, m/s: 12 m in 14 s with ramps of 1 s."""
-
-SLOWEST, FASTEST = 0.2, 2.0
-"""Walking speeds that a route can have, m/s: a shuffle and a jog."""
 
 OUTLINE = np.arange(0.0, PAPER_DISTANCE, OUTLINE_STEP)
 """Where an outline is sampled, m of the way."""
@@ -174,42 +169,86 @@ def _speeds(cruise: float, duration: float, ramp: float) -> tuple[tuple[float, .
     return tuple(times), np.array([speed_at(t, cruise, duration, ramp) for t in times])
 
 
-def paper_route(scene: Scene, start: tuple[float, float, float], rng: np.random.Generator) -> Route:
+@MOTIONS.register("paper")
+def paper_route(
+    scene: Scene,
+    start: Pose,
+    rng: np.random.Generator,
+    speed: float = PAPER_SPEED,
+    turns: int | None = None,
+    least_turn_deg: float = 20.0,
+    largest_turn_deg: float = 50.0,
+    quickest_turn: float = QUICKEST_TURN,
+    slowest_turn: float = SLOWEST_TURN,
+) -> Route:
     """Return a route of paper B (section 3): 12 m in 14 s, one or two turns of 20-50 deg over 0.8-1.6 s each.
 
-    The heading stays within +-50 deg of the start; the walker starts and stops over 1 s. Half of the routes have one
-    turn, half have two. Candidates that pass nearer than `CLEARANCE` to an obstacle are drawn again.
+    The heading stays within `largest_turn_deg` of the start; the walker starts and stops over 1 s. Half of the routes
+    have one turn, half have two. Candidates that pass nearer than `CLEARANCE` to an obstacle are drawn again. The
+    draws, and with them the path, do not depend on the speed.
+
+    Args:
+        scene: where it walks.
+        start: (x, y, heading) at t = 0, m and rad.
+        rng: what the turns are drawn from.
+        speed: between starting and stopping, m/s; all times stretch with it.
+        turns: how many, 0 to 6; None draws one or two.
+        least_turn_deg: smallest turn, degrees.
+        largest_turn_deg: largest turn, degrees.
+        quickest_turn: shortest time of a turn at `PAPER_SPEED`, s.
+        slowest_turn: longest time of a turn at `PAPER_SPEED`, s.
+
+    Raises:
+        ValueError: if a setting is impossible, or no such route fits the scene.
     """
-    count = int(rng.integers(1, 3))
+    if turns is not None and not (isinstance(turns, numbers.Integral) and 0 <= turns <= MOST_TURNS):
+        raise ValueError(f"turns is {turns!r}; expected a whole number from 0 to {MOST_TURNS}, or None for one or two")
+    if not 0.0 <= least_turn_deg <= largest_turn_deg <= 180.0:
+        raise ValueError(
+            f"least_turn_deg, largest_turn_deg are {least_turn_deg!r}, {largest_turn_deg!r}; expected 0 <= least <= "
+            "largest <= 180 degrees"
+        )
+    if not 0.0 < quickest_turn <= slowest_turn <= EARLIEST_TURN + 1.5:
+        raise ValueError(
+            f"quickest_turn, slowest_turn are {quickest_turn!r}, {slowest_turn!r}; expected 0 < quickest <= slowest "
+            f"<= {EARLIEST_TURN + 1.5} s"
+        )
+    sizes = math.radians(least_turn_deg), math.radians(largest_turn_deg)
+    count = int(rng.integers(1, 3)) if turns is None else int(turns)
     for _ in range(ATTEMPTS):
-        turns = _draw_turns(count, rng)
-        outline = _outline(start, turns)
+        drawn = _draw_turns(count, sizes, (quickest_turn, slowest_turn), rng)
+        outline = _outline(start, drawn, sizes[1])
         if outline is None or not scene.is_clear(outline, CLEARANCE - CORNER_CUT):
             continue
-        route = Route(start, turns=turns)
+        route = Route(start, turns=drawn)
         if scene.is_clear(route.points()[::3], CLEARANCE):
-            return route
-    raise ValueError(f"no route of 12 m with turns of 20-50 deg fits the scene {scene.name!r}; widen its free lane")
+            return route.at_speed(speed)
+    raise ValueError(
+        f"no route of 12 m with {'one or two' if turns is None else turns} turns of {least_turn_deg:g} to "
+        f"{largest_turn_deg:g} deg fits the scene {scene.name!r}; take route='standing', other turns, or another scene"
+    )
 
 
-def _draw_turns(count: int, rng: np.random.Generator) -> tuple[Turn, ...]:
+def _draw_turns(
+    count: int, sizes: tuple[float, float], times: tuple[float, float], rng: np.random.Generator
+) -> tuple[Turn, ...]:
     """Draw `count` turns, in the order of time."""
     begins = sorted(rng.uniform(EARLIEST_TURN, LATEST_TURN, count).tolist())
-    sizes = rng.uniform(SMALLEST_TURN, LARGEST_TURN, count).tolist()
+    angles = rng.uniform(*sizes, count).tolist()
     right = rng.integers(0, 2, count).tolist()
-    durations = rng.uniform(QUICKEST_TURN, SLOWEST_TURN, count).tolist()
-    return tuple(Turn(begins[k], durations[k], -sizes[k] if right[k] else sizes[k]) for k in range(count))
+    durations = rng.uniform(*times, count).tolist()
+    return tuple(Turn(begins[k], durations[k], -angles[k] if right[k] else angles[k]) for k in range(count))
 
 
-def _outline(start: tuple[float, float, float], turns: tuple[Turn, ...]) -> np.ndarray | None:
-    """Return the route with sharp corners as points (n, 2), or None when the turns overlap or go beyond 50 deg.
+def _outline(start: Pose, turns: tuple[Turn, ...], largest: float) -> np.ndarray | None:
+    """Return the route with sharp corners as points (n, 2), or None when the turns overlap or go too far.
 
     Cheap enough to throw most candidates away before the exact path is integrated.
     """
     turned, last_end = 0.0, 0.0
     for turn in turns:
         turned += turn.angle
-        if turn.start < last_end or abs(turned) > LARGEST_TURN:
+        if turn.start < last_end or abs(turned) > largest:
             return None
         last_end = turn.start + turn.duration
     x, y, heading = start
@@ -224,51 +263,13 @@ def _outline(start: tuple[float, float, float], turns: tuple[Turn, ...]) -> np.n
     return np.array((np.interp(OUTLINE, along, xs), np.interp(OUTLINE, along, ys))).T
 
 
-def straight_route(scene: Scene, start: tuple[float, float, float], rng: np.random.Generator) -> Route:
-    """Return a straight walk of 12 m in 14 s along the start heading."""
-    return Route(start)
+@MOTIONS.register("straight")
+def straight_route(scene: Scene, start: Pose, rng: np.random.Generator, speed: float = PAPER_SPEED) -> Route:
+    """Return a straight walk of 12 m in 14 s (at `PAPER_SPEED`) along the start heading."""
+    return Route(start).at_speed(speed)
 
 
-def standing_route(scene: Scene, start: tuple[float, float, float], rng: np.random.Generator) -> Route:
+@MOTIONS.register("standing")
+def standing_route(scene: Scene, start: Pose, rng: np.random.Generator, speed: float = PAPER_SPEED) -> Route:
     """Return 14 s of standing still."""
     return Route(start, distance=0.0)
-
-
-ROUTES: dict[str, Callable[[Scene, tuple[float, float, float], np.random.Generator], Route]] = {
-    "paper": paper_route,
-    "straight": straight_route,
-    "standing": standing_route,
-}
-"""Route name -> function (scene, start pose of the person, random generator) -> Route."""
-
-
-def choose_route(name: str, scene: Scene) -> str:
-    """Return the name of a route; a ValueError names the nearest, or says that the scene is too short for it."""
-    choose("route", name, ROUTES)
-    if name != "standing" and scene.clearance(Route(scene.start, SET_POINT + PAPER_DISTANCE).points()) < CLEARANCE:
-        raise ValueError(
-            f"the route {name!r} needs 12 m of free way, which the scene {scene.name!r} lacks; take route='standing' "
-            "or another scene"
-        )
-    return name
-
-
-def check_walking_speed(speed: float) -> float:
-    """Return the speed, m/s; a ValueError says what is expected."""
-    if not (isinstance(speed, numbers.Real) and SLOWEST <= speed <= FASTEST):
-        raise ValueError(f"walking_speed is {speed!r}; expected m/s from {SLOWEST} to {FASTEST}")
-    return float(speed)
-
-
-def make_route(
-    name: str,
-    scene: Scene,
-    start: tuple[float, float, float],
-    rng: np.random.Generator,
-    walking_speed: float = PAPER_SPEED,
-) -> Route:
-    """Return the route `name` from `start`, walked at a speed (m/s); a ValueError names the nearest if there is none.
-
-    The draws, and with them the path, do not depend on the speed.
-    """
-    return ROUTES[choose("route", name, ROUTES)](scene, start, rng).at_speed(walking_speed)

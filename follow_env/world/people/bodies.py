@@ -11,12 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
-from follow_env.registry import choose
+from follow_env.registry import Registry, choose
 from follow_env.world.people.mesh import Mesh
 
 ASSETS = Path(__file__).parent / "assets"
-BODIES = ("man", "man_tall", "man_heavy", "woman", "woman_slim", "woman_old", "child")
-"""Bodies by name; each has short or long sleeves and a hair style of its own."""
+BODIES: Registry[Path] = Registry("body")
+"""Files of the bodies; each has short or long sleeves and a hair style of its own."""
+for _name in ("man", "man_tall", "man_heavy", "woman", "woman_slim", "woman_old", "child"):
+    BODIES.register(_name)(ASSETS / f"{_name}.npz")
 DETAILS = ("low", "high")
 """Levels of detail: about 1.2k and 3k triangles."""
 MATERIALS = ("skin", "hair", "shirt", "trousers", "shoes", "eyes")
@@ -45,7 +47,9 @@ class Outfit:
                 raise ValueError(f"{name} is {color}; expected three sRGB values in [0, 1]")
 
 
-OUTFITS: dict[str, Outfit] = {
+OUTFITS: Registry[Outfit] = Registry("outfit")
+"""Outfits by name."""
+for _name, _outfit in {
     "blue": Outfit(),
     "green": Outfit((0.62, 0.42, 0.30), (0.06, 0.05, 0.05), (0.16, 0.48, 0.28), (0.34, 0.30, 0.24), (0.28, 0.18, 0.11)),
     "orange": Outfit((0.86, 0.68, 0.58), (0.45, 0.29, 0.14), (0.85, 0.45, 0.12), (0.15, 0.20, 0.34)),
@@ -56,8 +60,8 @@ OUTFITS: dict[str, Outfit] = {
     ),
     "checks": Outfit((0.82, 0.63, 0.52), (0.50, 0.48, 0.46), (0.55, 0.20, 0.22), (0.30, 0.25, 0.18), pattern="checks"),
     "gray": Outfit((0.50, 0.33, 0.23), (0.10, 0.07, 0.05), (0.45, 0.47, 0.50), (0.30, 0.31, 0.34)),
-}
-"""Outfits by name."""
+}.items():
+    OUTFITS.register(_name)(_outfit)
 SUITS: dict[str, Outfit] = {
     name: Outfit(shirt=color, trousers=color)
     for name, color in {
@@ -99,18 +103,16 @@ def load_body(name: str = "man", outfit: str | Outfit = "blue", detail: str = "l
 
     Args:
         name: one of `BODIES`.
-        outfit: a key of `OUTFITS`, or colors.
+        outfit: one of `OUTFITS`, or colors.
         detail: one of `DETAILS`.
 
     Raises:
         ValueError: there is no such body, outfit or detail; the message names the nearest.
     """
-    choose("body", name, BODIES)
     choose("detail", detail, DETAILS)
     if isinstance(outfit, str):
-        choose("outfit", outfit, tuple(OUTFITS))
-        outfit = OUTFITS[outfit]
-    arrays = _read(name)
+        outfit = OUTFITS.get(outfit)
+    arrays = _read(BODIES.get(name))
     count = int(arrays["low_vertices"]) if detail == "low" else len(arrays["vertices"])
     materials = arrays[f"{detail}_materials"]
     palette = np.array([getattr(outfit, material) for material in MATERIALS], np.float32)
@@ -134,9 +136,9 @@ def load_body(name: str = "man", outfit: str | Outfit = "blue", detail: str = "l
     )
 
 
-@lru_cache(maxsize=len(BODIES))
-def _read(name: str) -> dict[str, np.ndarray]:
-    with np.load(ASSETS / f"{name}.npz") as archive:
+@lru_cache(maxsize=16)
+def _read(file: Path) -> dict[str, np.ndarray]:
+    with np.load(file) as archive:
         return {key: archive[key] for key in archive.files}
 
 

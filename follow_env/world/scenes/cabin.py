@@ -4,6 +4,7 @@ Nobody walks 12 m in it: it has no routes, only people who stand, turn and float
 """
 
 from follow_env.world.scene import Box, Cylinder, Light, Material, Scene
+from follow_env.world.scenes import SCENES
 
 RACK = Material((0.82, 0.82, 0.78), 0.2)
 DRAWERS = (
@@ -28,6 +29,7 @@ X0, X1, HALF, HEIGHT = -4.2, 4.2, 1.5, 2.4
 RACKS = 8
 
 
+@SCENES.register("cabin")
 def cabin() -> Scene:
     """Return a module of 8.4 m x 3 m x 2.4 m along +x: eight racks a side, handrails, laptops, stowage, two hatches."""
     middle, length = 0.5 * (X0 + X1), X1 - X0

@@ -1,6 +1,7 @@
 """Paper B's corridor (figure 4): long, narrow, doors on both sides, uneven light."""
 
 from follow_env.world.scene import Box, Light, Material, Scene
+from follow_env.world.scenes import SCENES
 
 WALL = Material((0.86, 0.84, 0.78))
 SKIRTING = Material((0.32, 0.30, 0.28))
@@ -16,6 +17,7 @@ WIDTH = 3.6
 HEIGHT = 2.7
 
 
+@SCENES.register("corridor")
 def corridor() -> Scene:
     """Return a corridor of 23 m x 3.6 m x 2.7 m along +x with eight doors, radiators and four unequal lamps."""
     x0, x1 = LENGTH

@@ -1,6 +1,7 @@
 """Paper B's indoor scene (figure 5): an office with furniture and clutter on both sides of the route."""
 
 from follow_env.world.scene import Box, Cylinder, Light, Material, Primitive, Scene
+from follow_env.world.scenes import SCENES
 
 WALL = Material((0.88, 0.87, 0.82))
 BRICK = Material((0.66, 0.45, 0.36), texture="brick")
@@ -21,6 +22,7 @@ LAMP = Material((1.0, 0.97, 0.88))
 X0, X1, HALF, HEIGHT = -3.0, 19.0, 4.5, 2.8
 
 
+@SCENES.register("indoor")
 def indoor() -> Scene:
     """Return an office of 22 m x 9 m x 2.8 m: desks, chairs, shelves, plants, pillars and boxes beside the route."""
     middle, length = 0.5 * (X0 + X1), X1 - X0

@@ -40,7 +40,7 @@ def test_success_is_what_the_environment_says(estimator, seed):
 
 @pytest.mark.parametrize("control_hz", [10, 30, 60])
 def test_the_reference_follows_at_any_control_rate(control_hz):
-    env = FollowEnv("indoor", control_hz=control_hz)
+    env = FollowEnv(scene="indoor", control_hz=control_hz)
     policy = make_follower("akf", scene="indoor", control_hz=control_hz)
     for seed in range(2):
         observation, info = env.reset(seed=seed)

@@ -16,7 +16,7 @@ from baselines.followers.agents import SUFFIX, load_agent, save_agent, shipped, 
 from baselines.learned.recipes import RECIPES
 from baselines.suites.followers import cells, speed_cells
 from follow_env.envs.follow import FollowEnv
-from follow_env.world.motion.routes import PAPER_SPEED
+from follow_env.world.motion.profile import PAPER_SPEED
 
 RUN = Path(__file__).parents[3] / "results" / "followers"
 AGENTS = shipped()
@@ -124,7 +124,7 @@ def test_an_agent_of_another_version_is_refused(weights: Path) -> None:
     ],
 )
 def test_another_observation_is_refused(name: str, obs: str, wanted: str) -> None:
-    env = FollowEnv("corridor", obs=obs, camera={"width": 32, "height": 24})
+    env = FollowEnv(scene="corridor", obs=obs, camera={"width": 32, "height": 24})
     observation, _ = env.reset(seed=0)
     with pytest.raises(ValueError, match=rf"agent {name} got .*; it drives with obs='{wanted}'"):
         load_agent(name).predict(observation)

@@ -78,7 +78,7 @@ def test_a_training_killed_while_it_saves_goes_on_from_the_leg_before(
 
 def test_the_filter_feeds_the_agent_that_wants_estimates(tmp_path: Path) -> None:
     agent, state = load_agent(train("ppo_estimate", tmp_path), scene="indoor"), None
-    env = FollowEnv("indoor", obs=agent.observation)
+    env = FollowEnv(scene="indoor", obs=agent.observation)
     observation, _ = env.reset(seed=1)
     actions = []
     for _ in range(10):

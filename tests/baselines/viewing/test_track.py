@@ -44,7 +44,7 @@ def filmed(tmp_path_factory):
         cv2.imwrite(str(folder / f"depth/{frame:04d}.png"), (1000.0 * observation["depth"]).round().astype(np.uint16))
         observation, *_, info = env.step(np.zeros(2))
     camera = {"width": 160, "height": 120, "cx": env.camera.cx, "cy": env.camera.cy, "fps": 30}
-    mounting = {"forward": env.robot_config.camera_forward, "height": env.robot_config.camera_height}
+    mounting = {"forward": env.config.robot.camera_forward, "height": env.config.robot.camera_height}
     camera |= {"fx": env.camera.focal, "fy": env.camera.focal, "mounting": mounting}
     (folder / "camera.json").write_text(json.dumps(camera), encoding="utf-8")
     env.close()

@@ -62,7 +62,7 @@ def test_the_robots_view_alone_in_any_size(tmp_path, short):
     shown = frames(tmp_path / "view.mp4")
     assert shown.shape == (10, 300, 400, 3)
     assert cv2.imread(str(tmp_path / "view.png")).shape == (1080, 1440, 3)
-    env = FollowEnv("corridor", camera={"width": 400, "height": 300})
+    env = FollowEnv(scene="corridor", camera={"width": 400, "height": 300})
     env.reset(seed=0)
     assert np.abs(shown[0] - env.frame().rgb).mean() < 6.0
     env.close()

@@ -8,7 +8,7 @@ import pytest
 
 import follow_env
 from follow_env.camera.measurement import GaussMarkov, MeasurementModel
-from follow_env.config import MeasurementConfig
+from follow_env.sensors import MeasurementConfig
 
 DT = 1.0 / 30.0
 DEFAULT = MeasurementConfig()

@@ -68,7 +68,7 @@ def views(place, count):
         if place.clearance(np.array([[x, y]])) < 0.15:
             continue
         if count % 5 == 0:
-            walker = Walker(load_body(BODIES[count // 5 % len(BODIES)]))
+            walker = Walker(load_body(BODIES.names()[count // 5 % len(BODIES)]))
         count -= 1
         pose = CameraPose(x, y, float(rng.uniform(0.5, 1.5)), float(rng.uniform(-math.pi, math.pi)))
         away, aside = float(rng.uniform(0.9, 5.0)), float(rng.uniform(-0.4, 0.4))

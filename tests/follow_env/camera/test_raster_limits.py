@@ -109,7 +109,7 @@ def test_a_pose_that_is_not_a_number_is_one_clear_error():
 
 
 def test_bad_settings_and_meshes_are_clear_errors():
-    with pytest.raises(ValueError, match="supersample is 3; expected 1 or 2"):
+    with pytest.raises(ValueError, match="supersample is 3; expected a whole number >= 1 and <= 2"):
         CameraConfig(supersample=3)
     with pytest.raises(ValueError, match="threads is 0; expected"):
         RasterRenderer(scene(), SMALL, threads=0)

@@ -31,7 +31,7 @@ def random_views(name, count, seed):
         if place.clearance(np.array([[x, y]])) < 0.15:
             continue
         if k % 5 == 0:
-            walker = Walker(load_body(BODIES[k // 5 % len(BODIES)]))
+            walker = Walker(load_body(BODIES.names()[k // 5 % len(BODIES)]))
             stride = float(rng.uniform(0.0, 1.3)), float(rng.uniform(0.0, 1.6))
         k += 1
         pose = CameraPose(x, y, float(rng.uniform(0.5, 1.5)), float(rng.uniform(-math.pi, math.pi)))

@@ -14,7 +14,8 @@ import pytest
 
 from follow_env.camera import PinholeCamera, RGBDFrame
 from follow_env.camera.sensor.errors import RGBDSensor
-from follow_env.config import HARSH_SENSOR, IDEAL_SENSOR, CameraConfig, ColorConfig, DepthConfig, SensorConfig
+from follow_env.config import CameraConfig
+from follow_env.sensors import HARSH_SENSOR, IDEAL_SENSOR, ColorConfig, DepthConfig, SensorConfig
 
 WIDTH, HEIGHT = 250, 200
 GRAY = np.full((HEIGHT, WIDTH, 3), 128, np.uint8)

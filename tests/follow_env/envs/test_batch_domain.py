@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from follow_env.config import MeasurementConfig, RobotConfig, SensorConfig
+from follow_env.config import EnvConfig, RobotConfig
 from follow_env.envs.batch import FollowVectorEnv
-from follow_env.envs.kinematic.standin import EnvConfig
+from follow_env.sensors import MeasurementConfig, SensorConfig
 
 
 class Spread:

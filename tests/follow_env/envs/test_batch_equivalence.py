@@ -7,13 +7,15 @@ import pytest
 from scipy import optimize, stats
 
 from follow_env import IDS
-from follow_env.config import MeasurementConfig, RobotConfig
+from follow_env.config import RobotConfig
 from follow_env.envs.batch import FollowVectorEnv
 from follow_env.envs.follow import FollowEnv
+from follow_env.sensors import MeasurementConfig
 from follow_env.world.bullet import World
 from follow_env.world.kinematic.drive import roll
 from follow_env.world.kinematic.world import KinematicWorld
-from follow_env.world.motion.routes import Route, Turn, make_route
+from follow_env.world.motion.base import make_motion
+from follow_env.world.motion.routes import Route, Turn
 from follow_env.world.scene import footprint
 from follow_env.world.scenes import make_scene
 
@@ -70,7 +72,7 @@ def test_the_same_episodes_come_out_step_by_step(scene, settings, policy):
                 else:
                     tolerance = 1e-4 if key.startswith("person") else 0.04
                     assert np.abs(np.asarray(infos[key][i], float) - np.asarray(value, float)).max() < tolerance, key
-    assert steps == math.ceil(singles[0]._route.duration * 30.0 - 1e-9)
+    assert steps == math.ceil(singles[0].motion.duration * 30.0 - 1e-9)
     assert settings["obs"] == "state" or 0.5 < valid / (2 * steps) < 0.95
     batch.close()
     for single in singles:
@@ -179,7 +181,7 @@ def test_routes_and_starts_have_the_same_chances(scene):
     for seed in range(count):
         rng = np.random.default_rng(seed)
         shift = y + float(rng.uniform(-1.0, 1.0)) * place.start_width
-        route = make_route("paper", place, (x + 1.5, shift, yaw), rng)
+        route = make_motion("paper", place, (x + 1.5, shift, yaw), rng)
         ends.append((shift, *route.pose(7.0), *route.pose(14.0)))
     batch = FollowVectorEnv(1000, scene=scene, obs="state")
     _, info = batch.reset(seed=0)

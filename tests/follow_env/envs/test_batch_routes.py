@@ -7,7 +7,7 @@ import pytest
 
 from follow_env.envs.batch import FollowVectorEnv
 from follow_env.envs.follow import FollowEnv
-from follow_env.world.motion import routes
+from follow_env.world.motion.base import MOTIONS
 
 STOP, TURN = (4.0, 6.0), (6.0, 8.0)
 SPEED = 0.8
@@ -48,7 +48,7 @@ def u_turn(scene, start, rng, speed=1.0):
 
 def test_a_u_turn_with_a_stop_is_walked_as_in_the_single_environment(monkeypatch):
     """Defect of the past: a route that the batch did not know was walked straight ahead."""
-    monkeypatch.setitem(routes.ROUTES, "u_turn", u_turn)
+    monkeypatch.setitem(MOTIONS._components, "u_turn", u_turn)
     single, batch = FollowEnv(route="u_turn"), FollowVectorEnv(2, route="u_turn", autoreset_mode="Disabled")
     _, info = single.reset(seed=3)
     _, infos = batch.reset_as_single([3, 4])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from follow_env import IDS
-from follow_env.envs.follow import OBSERVATIONS
+from follow_env.config import OBSERVATIONS
 
 EVERY = list(itertools.product(IDS.values(), OBSERVATIONS))
 CORRIDOR, INDOOR = IDS["corridor"], IDS["indoor"]

@@ -15,7 +15,7 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_of_sb3
 
 from follow_env import IDS
-from follow_env.envs.follow import OBSERVATIONS
+from follow_env.config import OBSERVATIONS
 
 SMALL = {"width": 48, "height": 36}
 EVERY = list(itertools.product(IDS.values(), OBSERVATIONS))
@@ -243,7 +243,7 @@ def test_a_route_can_be_chosen_for_one_episode(make, episode):
 
 @pytest.mark.parametrize("route", ["paper", "straight"])
 def test_a_route_that_is_too_long_for_the_scene_is_one_clear_error(make, route):
-    message = rf"the route '{route}' needs 12 m of free way, which the scene 'cabin' lacks; take route='standing' or an"
+    message = r"scene 'cabin'; .*take route='standing'"
     with pytest.raises(ValueError, match=message):
         make(scene="cabin", route=route)
     env = make(scene="cabin", route="standing")
@@ -314,7 +314,7 @@ def test_an_outfit_can_be_chosen_for_one_episode(make):
         ({"person": "wman"}, ("'wman'", "did you mean 'woman'")),
         ({"outfit": "bleu"}, ("'bleu'", "did you mean 'blue'")),
         ({"sensor": {"measurement": {"mis_share": 0.5}}}, ("'mis_share'", "did you mean 'miss_share'")),
-        ({"walking_speed": 3.0}, ("3.0", "m/s from 0.2 to 2.0")),
+        ({"walking_speed": 3.0}, ("3.0", ">= 0.2 and <= 2 (m/s)")),
         ({"robot_pose": (1.0, 2.0)}, ("(1.0, 2.0)", "three finite numbers")),
         ({"robot_pose": (1.0, 2.0, math.nan)}, ("nan", "three finite numbers")),
         ({"robot_pose": 3}, ("3", "three finite numbers")),

@@ -23,9 +23,7 @@ FAR = (90.0, 90.0, 0.0)
 
 def kinematic(**settings):
     """An environment whose world is the kinematic one."""
-    env = FollowEnv(**settings)
-    env._world = KinematicWorld(env.scene, env.robot_config)
-    return env
+    return FollowEnv(engine="kinematic", **settings)
 
 
 def public(cls):

@@ -118,7 +118,7 @@ def test_the_plan_shows_round_solids_in_place(solid):
 @pytest.mark.parametrize("name", SCENES)
 def test_a_light_changes_only_the_light(name):
     """Normal is the scene as built; dim is 15 % of it at every pixel, to one level; depth and geometry never change."""
-    assert make_scene(name) == make_scene(name, "normal") == SCENES[name]()
+    assert make_scene(name) == make_scene(name, "normal") == SCENES.get(name)()
     pose, frames = CameraPose(1.0, 0.2, 1.0, 0.1), {}
     for light in LIGHTS:
         place = make_scene(name, light)

@@ -12,10 +12,9 @@ from baselines.learned.detector.augment import disturb, draw_backdrop
 from baselines.learned.detector.data import CAMERA, DataConfig, SampleSource, without_augmentation
 from baselines.learned.detector.preview import sheet
 from baselines.learned.detector.random_people import HARD_POSTURES, draw_posture
-from baselines.learned.detector.random_scenes import draw_room, draw_scene
+from baselines.learned.detector.random_scenes import DRAWN_SCENES, draw_room, draw_scene
 from follow_env.camera.pinhole import CameraPose
 from follow_env.world.people.walker import POSTURES
-from follow_env.world.scenes import SCENES
 from tracker.boxes import iou
 
 SOURCE = SampleSource(7)
@@ -146,7 +145,7 @@ def test_rooms_of_chance_have_room_for_people() -> None:
         x0, x1, y0, y1 = scene.bounds
         spots = np.column_stack([rng.uniform(x0, x1, 60), rng.uniform(y0, y1, 60)])
         assert sum(scene.clearance(spot[None]) > 0.2 for spot in spots) > 10
-    assert {draw_scene(np.random.default_rng(k)).name for k in range(30)} == {*SCENES, "room"}
+    assert {draw_scene(np.random.default_rng(k)).name for k in range(30)} == {*DRAWN_SCENES, "room"}
 
 
 def test_disturbance_keeps_the_form_of_a_picture_and_repeats() -> None:

@@ -10,7 +10,7 @@ from baselines.followers import calibration
 from baselines.papers.dong2018 import calibrate
 from baselines.papers.dong2018.calibrate import DT, _fit, _summarize
 from follow_env.camera.measurement import MeasurementModel
-from follow_env.config import MeasurementConfig
+from follow_env.sensors import MeasurementConfig
 from tracker.depth import RULES
 
 CONFIG = MeasurementConfig(
@@ -99,7 +99,7 @@ def test_the_shipped_noise_keeps_the_rule_and_a_smaller_q_would_not():
     clean = dataclasses.replace(
         MeasurementConfig(**calibration.sensor("fitted", "indoor")), outlier_share=0.0, miss_share=0.0
     )
-    env = calibrate.FollowEnv("indoor", sensor={"measurement": dataclasses.asdict(clean)})
+    env = calibrate.FollowEnv(scene="indoor", sensor={"measurement": dataclasses.asdict(clean)})
     smaller = (entry["process"][0], entry["process"][1] * (multiple - 1) / multiple)
     shares = calibrate._inflated_shares(
         env, "akf", calibration.NoiseModel(tuple(entry["measurement"]), smaller, tuple(entry["acceleration"]))

@@ -26,9 +26,10 @@ from baselines.papers.dong2018.calibrate_detector import tracked_errors
 from baselines.papers.dong2018.reproduce import reproduce
 from baselines.viewing import watch
 from follow_env.camera.measurement import MeasurementModel
-from follow_env.config import CameraConfig, MeasurementConfig, RobotConfig
+from follow_env.config import CameraConfig, RobotConfig
 from follow_env.envs.dashboard import Dashboard
 from follow_env.envs.follow import FollowEnv
+from follow_env.sensors import MeasurementConfig
 from tracker.boxes import Detection
 from tracker.detection.detector import GRID, PersonDetector
 from tracker.detection.networks import make_network
@@ -111,7 +112,7 @@ def test_an_episode_is_scored_at_every_step_with_an_estimate(rung, short):
 def test_at_a_stop_of_the_tracker_the_robot_halts_looks_finds_the_person_and_goes_on(seed, start):
     """The detector sees nobody for two seconds while the person walks on."""
     detector, robot = SeesBlue(), RobotConfig()
-    env = FollowEnv("corridor", obs="rgbd", camera=SMALL)
+    env = FollowEnv(scene="corridor", obs="rgbd", camera=SMALL)
     follower = make_follower("akf", "detector", camera=CameraConfig(**SMALL), detector=detector)
     observation, info = env.reset(seed=seed)
     state, ended, steps = None, False, []
@@ -139,7 +140,7 @@ def test_at_a_stop_of_the_tracker_the_robot_halts_looks_finds_the_person_and_goe
 def test_a_robot_that_looks_comes_back_to_a_person_whom_only_the_detector_missed(yaw):
     """A person stands ahead; the detector fails until the robot has turned away, and the robot sweeps back in time."""
     detector = SeesBlue()
-    env = FollowEnv("corridor", obs="rgbd", camera=SMALL)
+    env = FollowEnv(scene="corridor", obs="rgbd", camera=SMALL)
     follower = make_follower("akf", "detector", camera=CameraConfig(**SMALL), detector=detector)
     observation, info = env.reset(seed=2, options={"route": "standing", "robot_pose": (0.0, 0.0, yaw)})
     state, visible = None, []
@@ -270,7 +271,7 @@ def test_a_series_at_ten_hertz_has_the_correlation_time_of_the_one_it_was_taken_
 def test_rare_measurements_need_the_larger_q(monkeypatch):
     monkeypatch.setattr(calibrate, "RULE_EPISODES", 1)
     clean = MeasurementConfig(bearing_noise=0.004, bearing_correlation_s=0.0, distance_noise=0.004, distance_bias=0.0)
-    env = FollowEnv("corridor", sensor={"measurement": dataclasses.asdict(clean)})
+    env = FollowEnv(scene="corridor", sensor={"measurement": dataclasses.asdict(clean)})
     motion = {"bearing_rad_s": 0.49, "distance_m_s": 1.02, "bearing_rad_s2": 0.95, "distance_m_s2": 1.5}
     noise = calibrate.noise_by_rule("corridor", clean, motion, every=3)
     assert noise["process"][1] >= 3.0 * (calibrate.WALKING_SPEED * DT) ** 2

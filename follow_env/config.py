@@ -34,6 +34,8 @@ class RobotBody:
         chassis_low: underside of the box above the floor, m.
         chassis_mass: kg.
         wheel_mass: of each wheel, kg.
+        wheel_inertia: of each wheel with its geared motor's reflected inertia, about the axle, kg m^2; its reaction to
+            a quick start must not tip the robot.
         caster_offset: of the caster ahead of the box's middle, m.
         caster_radius: m.
         caster_mass: kg.
@@ -50,6 +52,7 @@ class RobotBody:
     chassis_height: Annotated[Real, Bounds("m", gt=0.0, le=2.0)] = 0.10
     chassis_mass: Annotated[Real, Bounds("kg", gt=0.0, le=500.0)] = 8.0
     wheel_mass: Annotated[Real, Bounds("kg", gt=0.0, le=100.0)] = 0.5
+    wheel_inertia: Annotated[Real, Bounds("kg m^2", gt=0.0, le=100.0)] = 0.02
     caster_offset: Annotated[Real, Bounds("m", ge=-2.0, le=2.0)] = -0.13
     caster_radius: Annotated[Real, Bounds("m", gt=0.0, le=1.0)] = 0.03
     caster_mass: Annotated[Real, Bounds("kg", gt=0.0, le=100.0)] = 0.2

@@ -12,7 +12,7 @@ import numpy as np
 
 from baselines.benchmark.build import cell_of, driver, environment
 from baselines.benchmark.cells import SCENES
-from baselines.benchmark.rollout import play
+from baselines.benchmark.player import play
 from baselines.learned.evaluation import HELD_SEEDS
 from baselines.learned.training import read_curve
 

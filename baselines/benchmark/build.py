@@ -15,7 +15,7 @@ from baselines.followers.build import make_follower
 from baselines.followers.calibration import detector_settings, noise_model, sensor
 from baselines.followers.perception import OBSERVATION_OF
 from baselines.followers.policy import Policy
-from baselines.followers.references import FLOORS
+from baselines.followers.references import POLICIES
 from follow_env.config import CameraConfig
 from follow_env.registry import choose
 from tracker.estimators.base import NoiseModel, Pair
@@ -50,11 +50,11 @@ def cell_of(policy: str, scene: str) -> Cell:
         return Cell("emulated", scene, "akf", policy, sensor="default")
     if policy == "oracle":
         return Cell("truth", scene, "none", policy)
-    if policy in FLOORS:
+    if policy in POLICIES:
         return Cell("emulated", scene, "none", policy, sensor="default")
     from baselines.followers.agents import load_agent, shipped
 
-    name = choose("policy", policy, (*ESTIMATORS, UNBIASED, *FLOORS, *shipped()))
+    name = choose("policy", policy, (*ESTIMATORS, UNBIASED, *POLICIES, *shipped()))
     if load_agent(name).observation == "rgbd_uint8":
         return Cell(PIXELS, scene, "none", name)
     return Cell("emulated", scene, "none", name, sensor="default")
@@ -94,8 +94,8 @@ def driver(cell: Cell, camera: Mapping[str, int] = CAMERA) -> Policy:
         cell: the factors.
         camera: that of its environment.
     """
-    if cell.controller in FLOORS:
-        return FLOORS[cell.controller]()
+    if cell.controller in POLICIES:
+        return POLICIES.get(cell.controller)()
     if cell.controller not in ("pi", UNBIASED):
         from baselines.followers.agents import load_agent
 

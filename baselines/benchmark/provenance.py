@@ -126,7 +126,7 @@ def _code_digest(also: Iterable[Path]) -> str:
     root = Path(__file__).parents[2]
     playing = ("follow_env", "tracker", "baselines/controllers", "baselines/followers", "baselines/benchmark/metrics")
     files = [path for folder in playing for path in (root / folder).rglob("*.py")]
-    files += [Path(__file__).with_name(name) for name in ("build.py", "cells.py", "rollout.py")]
+    files += [Path(__file__).with_name(name) for name in ("build.py", "cells.py", "player.py", "rollout.py")]
     total = hashlib.sha256()
     for path in sorted({*files, *also}):
         total.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())

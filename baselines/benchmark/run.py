@@ -12,11 +12,11 @@ from baselines.benchmark import store
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.executors.processes import Kind, play_all
 from baselines.benchmark.files import Value, write_csv, write_text
+from baselines.benchmark.markdown import markdown_table
 from baselines.benchmark.metrics.episode import Row
+from baselines.benchmark.player import Episode, EpisodeFunction
 from baselines.benchmark.progress import progress
-from baselines.benchmark.rollout import Episode, EpisodeFunction
 from baselines.benchmark.store import InputError, Packable, Store
-from baselines.papers.dong2018.report import markdown_table
 
 CONFIG = "config.json"
 _RESULTS = (CONFIG, "table1.csv", "table1.md", "followers.csv", "followers.md", "astronaut.md", "episodes.csv")

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 
 from baselines.benchmark.executors.processes import Keyed
-from baselines.benchmark.rollout import Episode
+from baselines.benchmark.player import Episode
 
 FILE_NAME = "episodes.sqlite"
 _APPLICATION = 0x666F6C77  # "folw": tells our files from other programs' databases

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from baselines.benchmark.rollout import Player
+    from baselines.benchmark.player import Player
 
 FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
 """Exit codes: something broke, the input was bad, Ctrl-C."""
@@ -49,7 +49,7 @@ def detecting() -> Iterator[None]:
 @contextmanager
 def playing(out: Path) -> Iterator[Player]:
     """Lend a player for a run that keeps its episodes in ``out``; an episode that breaks ends the command."""
-    from baselines.benchmark.rollout import Player
+    from baselines.benchmark.player import Player
 
     player = Player()
     try:

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from baselines.cli import bench, calibrate, detector, export, reproduce, speed, track, train, watch
+from baselines.cli import bench, calibrate, detector, export, listing, reproduce, speed, track, train, watch
 from baselines.cli.exits import BAD_INPUT, FAILED, INTERRUPTED, CommandError
 
 __all__ = ["BAD_INPUT", "FAILED", "INTERRUPTED", "main"]
@@ -40,10 +40,11 @@ class _Parser(argparse.ArgumentParser):
 
 def _parser() -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = _Parser(
-        prog="follow", description="Person following for mobile robots: reproduce, watch, track, calibrate, speed."
+        prog="follow",
+        description="Measure how well a robot follows a person.",
     )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    for command in (reproduce, bench, train, export, watch, track, calibrate, speed, detector):
+    for command in (reproduce, bench, listing, train, export, watch, track, calibrate, speed, detector):
         command.add(commands)
     return parser
 

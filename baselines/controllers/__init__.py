@@ -1,21 +1,5 @@
-"""Controllers: from an estimated (bearing, distance) to the robot's twist."""
+"""Controllers: from an estimated (bearing, distance) to the robot's twist; each is registered in its own file."""
 
-from __future__ import annotations
+from baselines.controllers.base import CONTROLLERS, Controller
 
-from typing import Protocol
-
-
-class Controller(Protocol):
-    """What every controller offers; the robot's limits are applied by the robot, not here."""
-
-    def reset(self) -> None:
-        """Forget everything but the settings."""
-
-    def command(self, bearing: float, distance: float, dt: float) -> tuple[float, float]:
-        """Return the twist (v m/s forward, omega rad/s counter-clockwise) for the next dt seconds.
-
-        Args:
-            bearing: Of the target, rad, positive to the left.
-            distance: Forward distance to the target, m.
-            dt: Control period, s, positive.
-        """
+__all__ = ["CONTROLLERS", "Controller"]

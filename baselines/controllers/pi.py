@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import math
 
+from baselines.controllers.base import CONTROLLERS
+from follow_env.config import EnvConfig
+
 Pair = tuple[float, float]
+PAPER_KP, PAPER_KI = (math.radians(43.0), 1.0), (math.radians(0.03), 1.0)
+"""Paper B's gains, read as `PIController.from_paper` says, 1/s and 1/s²."""
 
 
 class PIController:
@@ -57,9 +62,7 @@ class PIController:
         so kp = (0.7505, 1.0) 1/s and ki = (5.2e-4, 1.0) 1/s². Read literally (rad/s per rad, cm/s per cm, or sums
         without dt) the robot diverges, limit-cycles or never catches up.
         """
-        return cls(
-            kp=(math.radians(43.0), 1.0), ki=(math.radians(0.03), 1.0), set_point=(0.0, 1.5), integral_limit=None
-        )
+        return cls(PAPER_KP, PAPER_KI, set_point=(0.0, 1.5), integral_limit=None)
 
     def reset(self) -> None:
         """Empty the integrators."""
@@ -98,3 +101,9 @@ class PIController:
 
 def _clamp(value: float, limit: float) -> float:
     return min(max(value, -limit), limit)
+
+
+@CONTROLLERS.register("pi")
+def pi(config: EnvConfig, kp: Pair = PAPER_KP, ki: Pair = PAPER_KI, integral_limit: Pair | None = None) -> PIController:
+    """Return paper B's controller at the task's set point, or one with other gains."""
+    return PIController((kp[0], kp[1]), (ki[0], ki[1]), (0.0, config.task.set_point), integral_limit)

@@ -11,7 +11,8 @@ import numpy as np
 from baselines.controllers import Controller
 from baselines.controllers.pi import PIController
 from baselines.followers.perception import Percept
-from follow_env.config import RobotConfig
+from baselines.followers.recovery import Recovery
+from follow_env.config import EnvConfig, RobotConfig
 from tracker.estimators import Estimate, Estimator
 from tracker.estimators.base import Pair
 
@@ -24,12 +25,16 @@ class FollowerState:
         estimator, controller: their memory.
         measurement: latest measurement (bearing rad, distance m), or None when the last step had none.
         estimate: latest estimate, or None while nothing was ever measured.
+        last_bearing: of the latest measurement, rad, kept for a recovery.
+        missing: time since then, s.
     """
 
     estimator: Estimator
     controller: Controller
     measurement: Pair | None = None
     estimate: Estimate | None = None
+    last_bearing: float = 0.0
+    missing: float = 0.0
 
 
 class Follower:
@@ -41,6 +46,8 @@ class Follower:
         make_controller: returns a fresh controller for an episode.
         robot: gives the scale of the twist action.
         dt: control period, s.
+        recovery: drives while measurements are missing.
+        config: what it was built for, if it was built for an environment.
     """
 
     def __init__(
@@ -50,7 +57,10 @@ class Follower:
         make_controller: Callable[[], Controller] = PIController.from_paper,
         robot: RobotConfig | None = None,
         dt: float = 1.0 / 30.0,
+        recovery: Recovery | None = None,
+        config: EnvConfig | None = None,
     ) -> None:
+        self.config, self._recovery = config, recovery
         self._perceive = perceive
         self._make_estimator, self._make_controller = make_estimator, make_controller
         robot = robot or RobotConfig()
@@ -97,6 +107,13 @@ class Follower:
         state.estimate = state.estimator.update(measurement)
         if state.estimate is None:
             return self._action(0.0, 0.0)
+        if self._recovery is not None:
+            state.missing = 0.0 if measurement is not None else state.missing + self._dt
+            if measurement is not None:
+                state.last_bearing = measurement[0]
+            elif (search := self._recovery.command(state.last_bearing, state.missing)) is not None:
+                state.controller.reset()
+                return self._action(*search)
         return self._action(*state.controller.command(state.estimate.bearing, state.estimate.distance, self._dt))
 
     def _action(self, v: float, omega: float) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -9,17 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from follow_env.config import CameraConfig, RobotConfig
+from follow_env.config import CameraConfig, EnvConfig, RobotConfig
 from follow_env.geometry import Intrinsics
-from follow_env.registry import choose
+from follow_env.registry import Registry, choose
 from tracker.depth import Rule, measure
 from tracker.estimators.base import Pair
+from tracker.person_tracker import Detector, PersonTracker, TrackerSettings
 
 Percept = tuple[Pair | None, Pair]
 """A measurement (bearing rad, distance m) or None, and the odometry twist (v m/s, omega rad/s)."""
-
-OBSERVATION_OF = {"truth": "state", "emulated": "measurement", "mask": "rgbd_box", "detector": "rgbd"}
-"""Perception -> the environment's observation mode that it reads."""
 
 
 def perceive_state(observation: np.ndarray) -> Percept:
@@ -42,7 +41,7 @@ def perceive_odometry(observation: Mapping[str, np.ndarray]) -> Percept:
 
 @dataclass(frozen=True)
 class BoxPerception:
-    """Measures from RGB-D and a box: the `mask` rung. Depth is read from the box by `rule`, eqs. (24)-(31)."""
+    """Measures from RGB-D and a box: the `mask` perception. Depth is read from the box by `rule`, eqs. (24)-(31)."""
 
     intrinsics: Intrinsics
     camera_forward: float
@@ -74,3 +73,76 @@ def make_perception(
 def intrinsics_of(camera: CameraConfig) -> Intrinsics:
     """Return the intrinsics of a camera's pictures."""
     return Intrinsics.from_hfov(camera.width, camera.height, math.radians(camera.hfov_deg))
+
+
+PERCEPTIONS: Registry[Any] = Registry("perception")
+"""Classes with the class attribute `observation` (the environment's mode that they read).
+
+`(config, **settings)` makes a callable from an observation to a `Percept`; one with `make_tracker` tracks, with a
+memory of its own in each episode.
+"""
+
+
+@PERCEPTIONS.register("truth")
+class Truth:
+    """Reads the truth from a `state` observation."""
+
+    observation = "state"
+
+    def __init__(self, config: EnvConfig) -> None:
+        self.config = config
+
+    def __call__(self, observation: np.ndarray) -> Percept:
+        """Return (bearing and distance, odometry twist)."""
+        return perceive_state(observation)
+
+
+@PERCEPTIONS.register("emulated")
+class Emulated:
+    """Reads what a tracker would report from a `measurement` observation."""
+
+    observation = "measurement"
+
+    def __init__(self, config: EnvConfig) -> None:
+        self.config = config
+
+    def __call__(self, observation: np.ndarray) -> Percept:
+        """Return (measurement or None, odometry twist)."""
+        return perceive_measurement(observation)
+
+
+@PERCEPTIONS.register("mask")
+class Mask:
+    """Measures from RGB-D and the person's box; `rule` says how the depth is read from it."""
+
+    observation = "rgbd_box"
+
+    def __init__(self, config: EnvConfig, rule: Rule = "six_smallest") -> None:
+        self._measure = BoxPerception(config.intrinsics, config.mount.forward, rule)
+
+    def __call__(self, observation: Mapping[str, np.ndarray]) -> Percept:
+        """Return (measurement or None, odometry twist)."""
+        return self._measure(observation)
+
+
+@PERCEPTIONS.register("detector")
+class Detected:
+    """Tracks the person that a detector finds in RGB-D: by default the shipped one, which needs PyTorch."""
+
+    observation = "rgbd"
+
+    def __init__(self, config: EnvConfig, detector: Detector | None = None) -> None:
+        if detector is None:
+            from tracker.detection.detector import PersonDetector
+
+            detector = PersonDetector()
+        settings = TrackerSettings.for_rate(config.control_hz)
+        self.make_tracker = functools.partial(PersonTracker, detector, config.intrinsics, config.mount, settings)
+
+    def __call__(self, observation: Mapping[str, np.ndarray]) -> Percept:
+        """Return the odometry; the tracker measures."""
+        return perceive_odometry(observation)
+
+
+OBSERVATION_OF = {name: PERCEPTIONS.get(name).observation for name in PERCEPTIONS}
+"""Perception -> the environment's observation mode that it reads."""

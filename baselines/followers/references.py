@@ -1,17 +1,15 @@
-"""Floor and ceiling of every comparison: a parked robot, a random one, and one that knows the truth."""
+"""References of every comparison: a parked robot, a random one, and one that knows the truth."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from baselines.followers.policy import Policy
-from follow_env.config import RobotConfig
-from follow_env.envs.task import SET_POINT
+from follow_env.config import EnvConfig
+from follow_env.registry import Registry
 from tracker.estimators import Estimate
 from tracker.estimators.base import Pair
 
@@ -25,8 +23,18 @@ class NoState:
     estimate: Estimate | None = None
 
 
+POLICIES: Registry[Any] = Registry("policy")
+"""Classes with the class attribute `observation` (the environment's mode that they read); `(config)` makes a policy."""
+
+
+@POLICIES.register("parked")
 class Parked:
     """Never moves."""
+
+    observation = "measurement"
+
+    def __init__(self, config: EnvConfig | None = None) -> None:
+        self.config = config
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: np.ndarray | None = None, deterministic: bool = True
@@ -35,8 +43,14 @@ class Parked:
         return np.zeros(2, np.float32), NoState()
 
 
+@POLICIES.register("random")
 class Random:
     """Draws each action uniformly from the action space, from a generator seeded by the episode's first observation."""
+
+    observation = "measurement"
+
+    def __init__(self, config: EnvConfig | None = None) -> None:
+        self.config = config
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: np.ndarray | None = None, deterministic: bool = True
@@ -48,20 +62,25 @@ class Random:
         return state.generator.uniform(-1.0, 1.0, 2).astype(np.float32), state
 
 
+@POLICIES.register("oracle")
 class Oracle:
     """Knows bearing, distance and the person's velocity (`state` observation), and has only the robot's limits.
 
     Feedback linearization of the relative motion: with the person at (d, y) in the robot frame moving at (a, b),
-    d' = a - v + omega y and y' = b - omega d, so v = a + omega y + k (d - SET_POINT) and omega = (b + k y) / d make
+    d' = a - v + omega y and y' = b - omega d, so v = a + omega y + k (d - set point) and omega = (b + k y) / d make
     both errors decay at the rate k.
 
     Args:
-        robot: of the environment; scales the action.
+        config: of the environment: the robot scales the action, the task has the set point.
         gain: k, 1/s.
     """
 
-    def __init__(self, robot: RobotConfig | None = None, gain: float = 4.0) -> None:
-        self._robot, self._gain = robot or RobotConfig(), gain
+    observation = "state"
+
+    def __init__(self, config: EnvConfig | None = None, gain: float = 4.0) -> None:
+        self.config, self._gain = config, gain
+        config = config or EnvConfig()
+        self._robot, self._set_point = config.robot, config.task.set_point
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: np.ndarray | None = None, deterministic: bool = True
@@ -71,10 +90,6 @@ class Oracle:
         d = max(distance, 0.3)
         y = d * math.tan(min(max(bearing, -1.2), 1.2))
         omega = (left + self._gain * y) / d
-        v = ahead + omega * y + self._gain * (distance - SET_POINT)
+        v = ahead + omega * y + self._gain * (distance - self._set_point)
         shares = (v / self._robot.max_speed, omega / self._robot.max_yaw_rate)
         return np.array([min(max(share, -1.0), 1.0) for share in shares], np.float32), NoState()
-
-
-FLOORS: dict[str, Callable[[], Policy]] = {"parked": Parked, "random": Random, "oracle": Oracle}
-"""Name -> policy."""

@@ -13,13 +13,10 @@ from baselines.controllers import Controller
 from baselines.controllers.pi import PIController
 from baselines.followers.follower import Follower, FollowerState
 from baselines.followers.perception import perceive_odometry
-from follow_env.config import RobotConfig
+from baselines.followers.recovery import look_rate
+from follow_env.config import EnvConfig, RobotConfig
 from tracker.estimators import Estimator
 from tracker.person_tracker import PersonTracker, Track
-
-LOOK_RATE, LOOK_TIME = 0.5, 2.0
-"""A robot that looks for the person it lost turns this fast (rad/s) to one side for this long (s), the width of the
-picture, and then sweeps twice as far to either side in turn."""
 
 
 @dataclass(kw_only=True)
@@ -52,7 +49,7 @@ class TrackingFollower(Follower):
 
     Args:
         make_tracker: returns a fresh tracker for an episode; its rate is that of the observations.
-        make_estimator, make_controller, robot, dt: as in `Follower`.
+        make_estimator, make_controller, robot, dt, config: as in `Follower`.
     """
 
     def __init__(
@@ -62,8 +59,9 @@ class TrackingFollower(Follower):
         make_controller: Callable[[], Controller] = PIController.from_paper,
         robot: RobotConfig | None = None,
         dt: float = 1.0 / 30.0,
+        config: EnvConfig | None = None,
     ) -> None:
-        super().__init__(perceive_odometry, make_estimator, make_controller, robot, dt)
+        super().__init__(perceive_odometry, make_estimator, make_controller, robot, dt, config=config)
         self._make_tracker = make_tracker
 
     def _step(self, observation: Any, state: Any) -> tuple[np.ndarray, FollowerState]:
@@ -83,6 +81,6 @@ class TrackingFollower(Follower):
         state.measurement = state.estimate = None
         if state.bearing is None or track.state == "confirming":
             return self._action(0.0, 0.0), state
-        back = int((state.looked + LOOK_TIME) / (2.0 * LOOK_TIME)) % 2
+        rate = look_rate(state.bearing, state.looked)
         state.looked += self._dt
-        return self._action(0.0, math.copysign(LOOK_RATE, -state.bearing if back else state.bearing)), state
+        return self._action(0.0, rate), state

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from baselines.benchmark.build import PICTURE
 from baselines.benchmark.cells import SCENES, Cell
-from baselines.benchmark.rollout import play
+from baselines.benchmark.player import play
 from baselines.followers.agents import Agent
 from follow_env.envs.follow import FollowEnv
 

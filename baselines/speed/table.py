@@ -6,8 +6,8 @@ import dataclasses
 import importlib.metadata
 import json
 
+from baselines.benchmark.markdown import markdown_table
 from baselines.benchmark.provenance import machine, packages
-from baselines.papers.dong2018.report import markdown_table
 from baselines.speed import Report
 from baselines.speed.batch import BatchRate
 from baselines.speed.frames import FrameCost

@@ -12,14 +12,14 @@ from baselines.benchmark import provenance
 from baselines.benchmark.build import UNBIASED, cell_of
 from baselines.benchmark.cells import SCENES, Cell
 from baselines.benchmark.files import Value, write_csv, write_text
+from baselines.benchmark.markdown import markdown_table
 from baselines.benchmark.metrics import episode as metrics
 from baselines.benchmark.metrics.episode import Row
-from baselines.benchmark.rollout import EpisodeFunction
+from baselines.benchmark.player import EpisodeFunction
 from baselines.benchmark.run import Played, rows, run
 from baselines.benchmark.statistics import Score
 from baselines.benchmark.store import Store
 from baselines.followers.agents import shipped, weights_file
-from baselines.papers.dong2018.report import markdown_table
 from follow_env.world.motion.profile import PAPER_SPEED
 
 EPISODES = 100

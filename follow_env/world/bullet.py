@@ -20,8 +20,6 @@ SOLVER_ITERATIONS = 10
 CONTACT_BREAKING = 0.0005
 """Contact points farther apart than this are dropped, m: a rolling wheel keeps one point instead of a trail of four."""
 WHEEL_JOINTS = (0, 1)
-ROTOR_INERTIA = 0.02
-"""Wheel with its geared motor's reflected inertia about the axle, kg m^2."""
 SHAPES = {
     Box: pybullet.GEOM_BOX,
     Cylinder: pybullet.GEOM_CYLINDER,
@@ -261,6 +259,6 @@ class World:
                 robot, link, lateralFriction=friction, rollingFriction=0.0, spinningFriction=0.0, **still
             )
         for link in WHEEL_JOINTS:
-            inertia = (0.002, ROTOR_INERTIA, 0.002)
+            inertia = (0.1 * body.wheel_inertia, body.wheel_inertia, 0.1 * body.wheel_inertia)
             pybullet.changeDynamics(robot, link, localInertiaDiagonal=inertia, physicsClientId=client)
         return robot

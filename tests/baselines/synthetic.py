@@ -16,8 +16,8 @@ import gymnasium as gym
 import numpy as np
 
 from baselines.benchmark.cells import Cell
+from baselines.benchmark.player import Episode, play
 from baselines.benchmark.provenance import Plan
-from baselines.benchmark.rollout import Episode, play
 from baselines.followers.build import make_estimator
 from baselines.followers.follower import Follower
 from baselines.followers.perception import perceive_measurement

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tracker.estimators.base import Pair
+from tracker.estimators.base import ESTIMATORS, NoiseModel, Pair
 from tracker.estimators.kf import KalmanFilter
 from tracker.estimators.two_axis import chi2_quantile
 
@@ -36,3 +36,9 @@ class AdaptiveKalmanFilter(KalmanFilter):
             process_noise, measurement_noise, initial_state=initial_state, initial_variance=initial_variance
         )
         self._bearing.chi2 = self._distance.chi2 = chi2_quantile(alpha)
+
+
+@ESTIMATORS.register("akf")
+def akf(noise: NoiseModel, alpha: float = 0.05) -> AdaptiveKalmanFilter:
+    """Return paper B's adaptive filter with a significance of its test."""
+    return AdaptiveKalmanFilter(noise.process, noise.measurement, alpha)

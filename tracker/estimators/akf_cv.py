@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tracker.estimators.base import Pair, checked_motion, positive_pair
+from tracker.estimators.base import ESTIMATORS, NoiseModel, Pair, checked_motion, positive_pair
 from tracker.estimators.two_axis import Axis, TwoAxisFilter, chi2_quantile
 
 _COUPLED_BEARING = math.radians(60.0)
@@ -97,3 +97,9 @@ class RateAxis(Axis):
         self.covariance -= gain * self.covariance
         self.variance -= gain * self.variance
         return nis, inflation
+
+
+@ESTIMATORS.register("akf_cv")
+def akf_cv(noise: NoiseModel, alpha: float | None = 0.05) -> AugmentedKalmanFilter:
+    """Return the augmented filter with a significance of its test."""
+    return AugmentedKalmanFilter(noise.acceleration, noise.measurement, alpha)

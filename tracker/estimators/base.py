@@ -12,8 +12,11 @@ search turn of more than half a revolution ends where it should.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol
+
+from follow_env.registry import Registry
 
 Action = Literal["accept", "inflate", "miss"]
 Pair = tuple[float, float]
@@ -74,6 +77,10 @@ class NoiseModel:
     measurement: Pair
     process: Pair
     acceleration: Pair
+
+
+ESTIMATORS: Registry[Callable[..., Estimator]] = Registry("estimator", "tracker.estimators")
+"""Functions (`NoiseModel`, **settings) that return a fresh estimator; each is registered in its own file."""
 
 
 def finite_pair(name: str, pair: Pair) -> Pair:

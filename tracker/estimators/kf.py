@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tracker.estimators.base import Pair, checked_motion, positive_pair
+from tracker.estimators.base import ESTIMATORS, NoiseModel, Pair, checked_motion, positive_pair
 from tracker.estimators.two_axis import Axis, TwoAxisFilter
 
 
@@ -47,3 +47,9 @@ class KalmanFilter(TwoAxisFilter):
             self._bearing.predict(-omega, dt)
             self._bearing.value = math.remainder(self._bearing.value, math.tau)
             self._distance.predict(-v, dt)
+
+
+@ESTIMATORS.register("kf")
+def kf(noise: NoiseModel) -> KalmanFilter:
+    """Return paper B's Kalman filter."""
+    return KalmanFilter(noise.process, noise.measurement)

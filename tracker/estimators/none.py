@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from tracker.estimators.base import MEASUREMENT, Action, Estimate, Pair, checked_motion, finite_pair
+from tracker.estimators.base import (
+    ESTIMATORS,
+    MEASUREMENT,
+    Action,
+    Estimate,
+    NoiseModel,
+    Pair,
+    checked_motion,
+    finite_pair,
+)
 
 
 class NoFilter:
@@ -33,3 +42,9 @@ class NoFilter:
             return None
         action: Action = "miss" if measurement is None else "accept"
         return Estimate(*self._last, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (1.0, 1.0), (action, action))
+
+
+@ESTIMATORS.register("none")
+def no_filter(noise: NoiseModel) -> NoFilter:
+    """Return the estimator that filters nothing."""
+    return NoFilter()

@@ -53,13 +53,13 @@ class EpisodeMetrics:
     def __init__(self, cell: Cell, seed: int) -> None:
         self._cell = cell
         self._seed = seed
-        self._steps: list[_Step] = []
+        self._steps: list[Step] = []
 
     def record(
         self, info: Mapping[str, Any], estimate: Estimate | None, measurement: tuple[float, float] | None
     ) -> None:
         """Add one instant: what was true, and what the policy believed when it had seen that instant's observation."""
-        self._steps.append(_Step.of(info, estimate, measurement))
+        self._steps.append(Step.of(info, estimate, measurement))
 
     def row(self, terminated: bool) -> Row:
         """The finished episode's numbers, keyed by COLUMNS.
@@ -76,10 +76,10 @@ class EpisodeMetrics:
         last = steps[-1]
         ended = "collision" if last.collision else "lost" if terminated else "time"
         estimated = [step for step in steps if step.errors is not None]
-        spans = _out_of_view(steps)
+        spans = spans_out_of_view(steps)
         longest = max(spans, default=0.0)
-        in_band = _share(_in_band(step) for step in steps)
-        success = ended == "time" and longest <= SUCCESS_OUT_OF_VIEW + 1e-9 and in_band >= SUCCESS_BAND_SHARE
+        band = share(in_band(step) for step in steps)
+        success = ended == "time" and longest <= SUCCESS_OUT_OF_VIEW + 1e-9 and band >= SUCCESS_BAND_SHARE
         row: Row = {
             "perception": self._cell.perception,
             "scene": self._cell.scene,
@@ -93,18 +93,18 @@ class EpisodeMetrics:
             "duration_s": last.time,
             "ended": ended,
             "estimate_steps": len(estimated),
-            "measurement_share": _share(step.measured for step in steps),
-            "angle_tracking_rmse_rad": _rms([step.bearing for step in steps]),
-            "distance_tracking_rmse_m": _rms([step.distance - SET_POINT for step in steps]),
-            "in_band_share": in_band,
+            "measurement_share": share(step.measured for step in steps),
+            "angle_tracking_rmse_rad": rms([step.bearing for step in steps]),
+            "distance_tracking_rmse_m": rms([step.distance - SET_POINT for step in steps]),
+            "in_band_share": band,
             "longest_out_of_view_s": longest,
             "loss_count": len(spans),
             "min_surface_distance_m": min(step.surface_distance for step in steps),
-            "seconds_nearer_045_m": _seconds_near(steps),
+            "seconds_nearer_045_m": seconds_near(steps),
             "collision_with": last.collision_with,
             "success": int(success),
-            "saturation_share": _share(step.saturated for step in steps[1:]),
-            "path_ratio": _path_ratio(steps),
+            "saturation_share": share(step.saturated for step in steps[1:]),
+            "path_ratio": path_ratio(steps),
         }
         for axis, (name, unit) in enumerate((("angle", "rad"), ("distance", "m"))):
             errors = [step.errors[axis] for step in estimated if step.errors is not None]
@@ -137,7 +137,7 @@ def quantile(values: Sequence[float], share: float) -> float:
     return ordered[below] + (position - below) * (ordered[above] - ordered[below])
 
 
-class _Step(NamedTuple):
+class Step(NamedTuple):
     """One instant of an episode, SI units."""
 
     time: float
@@ -156,15 +156,18 @@ class _Step(NamedTuple):
     twist: tuple[float, float]
     saturated: bool
 
+    @staticmethod
+    def errors_of(estimate: Sequence[float], bearing: float, distance: float) -> tuple[float, float]:
+        """Return the errors of an estimate (bearing rad, distance m) against the truth."""
+        return math.remainder(estimate[0] - bearing, 2.0 * math.pi), estimate[1] - distance
+
     @classmethod
-    def of(cls, info: Mapping[str, Any], estimate: Estimate | None, measurement: tuple[float, float] | None) -> _Step:
+    def of(cls, info: Mapping[str, Any], estimate: Estimate | None, measurement: tuple[float, float] | None) -> Step:
+        """Return the moment of an environment's info and what the policy believed then."""
         bearing, distance = float(info["bearing"]), float(info["distance"])
         errors = None
         if estimate is not None:
-            errors = (
-                math.remainder(float(estimate.bearing) - bearing, 2.0 * math.pi),
-                float(estimate.distance) - distance,
-            )
+            errors = cls.errors_of((float(estimate.bearing), float(estimate.distance)), bearing, distance)
         robot, person, twist = info["robot_pose"], info["person_pose"], info["twist"]
         return cls(
             time=float(info["time"]),
@@ -202,7 +205,7 @@ def _error_columns(errors: Sequence[float], name: str, unit: str) -> Row:
     outlier_squares = math.fsum(error * error for error in outliers)
     p95 = quantile([abs(error) for error in errors], 0.95)
     return {
-        **dict(zip(columns, (_rms(errors), math.fsum(errors) / len(errors), p95), strict=True)),
+        **dict(zip(columns, (rms(errors), math.fsum(errors) / len(errors), p95), strict=True)),
         tails[0]: len(outliers) / len(errors),
         tails[1]: outlier_squares / squares if squares > 0.0 else 0.0,
     }
@@ -218,62 +221,67 @@ def _correlation(errors: Sequence[float]) -> float | None:
     return products / squares if squares > 0.0 else None
 
 
-def _consistency_columns(updates: Sequence[_Step], axis: int, name: str) -> Row:
+def _consistency_columns(updates: Sequence[Step], axis: int, name: str) -> Row:
     """What the filter's own test said of the measurements of one axis."""
     columns = (f"{name}_inflated_share", f"{name}_nis_mean", f"{name}_nis_inside_95_share")
     if not updates:
         return dict.fromkeys(columns)
     nis = [float(step.nis[axis]) for step in updates]
     values = (
-        _share(step.actions[axis] == "inflate" for step in updates),
+        share(step.actions[axis] == "inflate" for step in updates),
         math.fsum(nis) / len(nis),
-        _share(NIS_BOUNDS[0] <= value <= NIS_BOUNDS[1] for value in nis),
+        share(NIS_BOUNDS[0] <= value <= NIS_BOUNDS[1] for value in nis),
     )
     return dict(zip(columns, values, strict=True))
 
 
-def _motion_columns(steps: Sequence[_Step]) -> Row:
+def _motion_columns(steps: Sequence[Step]) -> Row:
     """Rms acceleration and jerks by finite differences of the odometry's mean twist."""
-    acceleration = _differences([step.twist[0] for step in steps], steps)
-    angular = _differences([step.twist[1] for step in steps], steps)
+    acceleration = differences([step.twist[0] for step in steps], steps)
+    angular = differences([step.twist[1] for step in steps], steps)
     return {
-        "rms_acceleration_m_s2": _rms(acceleration),
-        "rms_jerk_m_s3": _rms(_differences(acceleration, steps[1:])),
-        "rms_angular_jerk_rad_s3": _rms(_differences(angular, steps[1:])),
+        "rms_acceleration_m_s2": rms(acceleration),
+        "rms_jerk_m_s3": rms(differences(acceleration, steps[1:])),
+        "rms_angular_jerk_rad_s3": rms(differences(angular, steps[1:])),
     }
 
 
-def _differences(values: Sequence[float], steps: Sequence[_Step]) -> list[float]:
+def differences(values: Sequence[float], steps: Sequence[Step]) -> list[float]:
+    """Return the rates of change between steps, one fewer than values."""
     return [(values[k] - values[k - 1]) / (steps[k].time - steps[k - 1].time) for k in range(1, len(values))]
 
 
-def _out_of_view(steps: Sequence[_Step]) -> list[float]:
+def spans_out_of_view(steps: Sequence[Step]) -> list[float]:
     """Durations, s, of the spans out of view: the number of instants unseen in a row times the period."""
     period = (steps[-1].time - steps[0].time) / max(len(steps) - 1, 1)
     return [period * len(list(span)) for visible, span in groupby(steps, key=lambda step: step.visible) if not visible]
 
 
-def _in_band(step: _Step) -> bool:
+def in_band(step: Step) -> bool:
+    """Whether the person is at about the right distance, about ahead."""
     return BAND_DISTANCE[0] <= step.distance <= BAND_DISTANCE[1] and abs(step.bearing) <= BAND_BEARING
 
 
-def _seconds_near(steps: Sequence[_Step]) -> float:
+def seconds_near(steps: Sequence[Step]) -> float:
+    """Return the time within `PERSONAL_SURFACE` of the person, s."""
     return math.fsum(
         steps[k].time - steps[k - 1].time for k in range(1, len(steps)) if steps[k].surface_distance < PERSONAL_SURFACE
     )
 
 
-def _path_ratio(steps: Sequence[_Step]) -> float | None:
+def path_ratio(steps: Sequence[Step]) -> float | None:
     """The robot's path length over the person's; None when the person did not move."""
     robot = math.fsum(math.dist(steps[k].robot, steps[k - 1].robot) for k in range(1, len(steps)))
     person = math.fsum(math.dist(steps[k].person, steps[k - 1].person) for k in range(1, len(steps)))
     return robot / person if person > 0.0 else None
 
 
-def _share(flags: Any) -> float:
+def share(flags: Any) -> float:
+    """Return how many of the flags are set; 0 of none."""
     values = [bool(flag) for flag in flags]
     return sum(values) / len(values) if values else 0.0
 
 
-def _rms(values: Sequence[float]) -> float | None:
+def rms(values: Sequence[float]) -> float | None:
+    """Return the root of the mean square, or None of nothing."""
     return math.sqrt(math.fsum(value * value for value in values) / len(values)) if values else None

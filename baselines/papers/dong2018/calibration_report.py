@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from baselines.papers.dong2018.report import markdown_table
+from baselines.benchmark.markdown import markdown_table
 
 
 def summary(calibration: dict[str, Any]) -> str:

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 
 from baselines.benchmark.cells import ESTIMATORS, SCENES, Cell
 from baselines.benchmark.files import Value
+from baselines.benchmark.markdown import markdown_table
 from baselines.benchmark.metrics.episode import Row
 from baselines.benchmark.metrics.tracking import AT_THE_PERSON
 from baselines.benchmark.statistics import PooledError
 from baselines.papers.dong2018.explain import NAMES, number
-from baselines.papers.dong2018.report import difference_text, markdown_table
+from baselines.papers.dong2018.report import difference_text
 from baselines.papers.dong2018.table1 import QUANTITIES, UNITS, Table1
 
 COST_COLUMNS = (

@@ -10,8 +10,8 @@ from baselines.benchmark import provenance
 from baselines.benchmark.files import write_csv, write_text
 from baselines.benchmark.metrics import episode as metrics
 from baselines.benchmark.metrics import tracking
+from baselines.benchmark.player import EpisodeFunction
 from baselines.benchmark.provenance import Plan
-from baselines.benchmark.rollout import EpisodeFunction
 from baselines.benchmark.run import Played, rows, run
 from baselines.benchmark.store import Store
 from baselines.papers.dong2018 import figures

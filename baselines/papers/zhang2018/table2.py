@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from baselines.benchmark.files import Value
-from baselines.papers.dong2018.report import markdown_table
+from baselines.benchmark.markdown import markdown_table
 from baselines.papers.zhang2018.sequences import POSTURES, TABLE_2, play
 from baselines.papers.zhang2018.sequences import Sequence as Film
 from tracker.depth import Box

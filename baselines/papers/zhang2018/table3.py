@@ -14,7 +14,7 @@ import numpy as np
 import torch
 
 from baselines.benchmark.files import Value, write_csv, write_text
-from baselines.papers.dong2018.report import markdown_table
+from baselines.benchmark.markdown import markdown_table
 from baselines.papers.zhang2018.sequences import Sequence as Film
 from baselines.papers.zhang2018.sequences import play
 from baselines.papers.zhang2018.table2 import NETS, OURS, SSD

@@ -188,7 +188,7 @@ def test_progress_on_a_terminal_is_a_bar(monkeypatch: pytest.MonkeyPatch, capsys
 
 @pytest.fixture
 def player() -> Iterator[object]:
-    from baselines.benchmark.rollout import Player
+    from baselines.benchmark.player import Player
 
     player = Player()
     yield player

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from baselines.benchmark.cells import Cell
-from baselines.benchmark.rollout import Episode, Timing
+from baselines.benchmark.player import Episode, Timing
 from baselines.benchmark.store import FILE_NAME, InputError, Store
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -11,7 +11,7 @@ import pytest
 from safetensors.numpy import load_file, save_file
 
 from baselines.benchmark.cells import Cell
-from baselines.benchmark.rollout import Player
+from baselines.benchmark.player import Player
 from baselines.followers.agents import SUFFIX, load_agent, save_agent, shipped, weights_file
 from baselines.learned.recipes import RECIPES
 from baselines.suites.followers import cells, speed_cells

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from baselines.followers.build import make_follower
-from baselines.followers.tracking_follower import LOOK_RATE, TrackingFollower
+from baselines.followers.recovery import LOOK_RATE
+from baselines.followers.tracking_follower import TrackingFollower
 from follow_env.config import CameraConfig, RobotConfig
 from follow_env.envs.follow import FollowEnv
 from tracker.boxes import Detection

@@ -12,7 +12,7 @@ from baselines.benchmark.build import cell_of
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.metrics.episode import COLUMNS as ROW_COLUMNS
 from baselines.benchmark.metrics.episode import Row
-from baselines.benchmark.rollout import Player
+from baselines.benchmark.player import Player
 from baselines.benchmark.statistics import Score, interquartile_mean
 from baselines.suites.followers import COLUMNS, REFERENCE, policy_name, records, report
 

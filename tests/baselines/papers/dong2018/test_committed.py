@@ -8,8 +8,8 @@ import pytest
 from baselines.benchmark import provenance
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.files import write_csv
+from baselines.benchmark.player import Player
 from baselines.benchmark.provenance import Plan
-from baselines.benchmark.rollout import Player
 from baselines.followers import calibration
 from baselines.papers.dong2018.table1 import COLUMNS, Table1
 

@@ -14,12 +14,12 @@ from baselines.benchmark import build as assembly
 from baselines.benchmark.cells import Cell, table1_cells
 from baselines.benchmark.metrics import tracking
 from baselines.benchmark.metrics.tracking import TrackingMetrics
+from baselines.benchmark.player import Player
 from baselines.benchmark.provenance import Plan
-from baselines.benchmark.rollout import Player
 from baselines.cli import main as cli
 from baselines.followers import build
 from baselines.followers.build import make_follower
-from baselines.followers.tracking_follower import LOOK_RATE
+from baselines.followers.recovery import LOOK_RATE
 from baselines.papers.dong2018 import calibrate, figures
 from baselines.papers.dong2018.calibrate import DT, error_statistics
 from baselines.papers.dong2018.calibrate_detector import tracked_errors

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from baselines.benchmark.cells import Cell
+from baselines.benchmark.markdown import markdown_table
 from baselines.benchmark.metrics.episode import Row
 from baselines.papers.dong2018.curves import curve_records
 from baselines.papers.dong2018.explain import explain
-from baselines.papers.dong2018.report import markdown_table, report
+from baselines.papers.dong2018.report import report
 from baselines.papers.dong2018.table1 import PAPER_RMSE, Table1
 
 

@@ -405,7 +405,7 @@ def test_real_results_do_not_depend_on_processes_or_on_the_cpus_features(tmp_pat
 def test_real_episodes_do_not_depend_on_the_cpus_features(perception: str) -> None:
     script = (
         "from baselines.benchmark.cells import Cell\n"
-        "from baselines.benchmark.rollout import Player\n"
+        "from baselines.benchmark.player import Player\n"
         f"episode = Player()(Cell({perception!r}, 'indoor', 'akf'), 0)\n"
         "print(episode.row, episode.curve.tobytes().hex())\n"
     )

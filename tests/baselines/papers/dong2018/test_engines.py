@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from baselines.suites.engines import following, motion
+from baselines.papers.dong2018.engines import following, motion
 from follow_env import IDS
 
 

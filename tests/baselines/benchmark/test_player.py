@@ -4,7 +4,7 @@ import pytest
 
 from baselines.benchmark.build import driver, environment
 from baselines.benchmark.cells import Cell
-from baselines.benchmark.rollout import play
+from baselines.benchmark.player import play
 from baselines.followers.build import make_follower
 from follow_env.envs.follow import FollowEnv
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from baselines.benchmark.build import driver, environment, environment_kwargs
 from baselines.benchmark.cells import SCENES, Cell
+from baselines.benchmark.markdown import markdown_table
 from baselines.benchmark.metrics.episode import EpisodeMetrics, Row
-from baselines.benchmark.rollout import play
+from baselines.benchmark.player import play
 from baselines.benchmark.statistics import Difference, PooledError
 from baselines.papers.dong2018.explain import NAMES
-from baselines.papers.dong2018.report import markdown_table
 from follow_env.config import RobotConfig
 from follow_env.envs.batch import FollowVectorEnv
 from follow_env.envs.follow import FollowEnv

@@ -16,7 +16,7 @@ from baselines.benchmark.markdown import markdown_table
 from baselines.benchmark.metrics.base import find_metric, measured
 from baselines.benchmark.metrics.episode import Row
 from baselines.benchmark.progress import progress
-from baselines.benchmark.provenance import machine, packages, run_digest
+from baselines.benchmark.provenance import machine, packages
 from baselines.benchmark.statistics import Difference, Score
 from baselines.benchmark.store import InputError
 from baselines.benchmark.suite import Suite, find_suite
@@ -209,13 +209,8 @@ def write(result: Result, out: Path, metrics: Sequence[str] | None, how: Mapping
     return text
 
 
-def code_digest() -> str:
-    """Return the hash of the code that plays, with the packages that compute: traces of one folder share it."""
-    return run_digest({"packages": packages()})
-
-
 def claim(out: Path, resume: bool, code: str) -> Path:
-    """Return the folder of the traces in a results folder of our own; `code` is that of `code_digest`.
+    """Return the folder of the traces in a results folder of our own; `code` is that of `provenance.trace_digest`.
 
     Raises:
         InputError: if the folder holds something else, or a run that is not to be resumed.

@@ -25,6 +25,8 @@ EPISODES = {"truth": 100, "emulated": 100, "mask": 20, "detector": 20}
 
 _STUDY_PART = {"sensitivity": 10, "family": 10, "rules": 2}
 """A study plays this part of the table's episodes, two at least."""
+_COMPUTING = ("gymnasium", "numba", "numpy", "opencv-python-headless", "pybullet", "torch")
+_PLAYING = ("follow_env", "tracker", "baselines/controllers", "baselines/followers")
 _PACKAGES = ("follow-env", "gymnasium", "matplotlib", "numpy", "opencv-python-headless", "pybullet", "tqdm")
 
 
@@ -122,13 +124,25 @@ def run_digest(settings: Mapping[str, Any], *also: Path) -> str:
     return digest({**settings, "code": _code_digest(also)})
 
 
+def trace_digest() -> str:
+    """SHA-256 of the packages and the code that make a trace: what traces in one folder share. No metric is in it."""
+    root = Path(__file__).parents[2]
+    files = {path for folder in _PLAYING for path in (root / folder).rglob("*.py")}
+    files |= {Path(__file__).with_name(name) for name in ("rollout.py", "trace.py", "trial.py")}
+    return digest({"packages": {name: _version(name) for name in _COMPUTING}, "code": _files_digest(root, files)})
+
+
 def _code_digest(also: Iterable[Path]) -> str:
     root = Path(__file__).parents[2]
-    playing = ("follow_env", "tracker", "baselines/controllers", "baselines/followers", "baselines/benchmark/metrics")
-    files = [path for folder in playing for path in (root / folder).rglob("*.py")]
+    folders = (*_PLAYING, "baselines/benchmark/metrics")
+    files = [path for folder in folders for path in (root / folder).rglob("*.py")]
     files += [Path(__file__).with_name(name) for name in ("build.py", "cells.py", "player.py", "rollout.py")]
+    return _files_digest(root, {*files, *also})
+
+
+def _files_digest(root: Path, files: Iterable[Path]) -> str:
     total = hashlib.sha256()
-    for path in sorted({*files, *also}):
+    for path in sorted(files):
         total.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return total.hexdigest()
 

@@ -50,7 +50,8 @@ def _all_followers(parsed: argparse.Namespace, out: Path) -> str:
 
 
 def _suite(parsed: argparse.Namespace, out: Path) -> str:
-    from baselines.benchmark.evaluate import EPISODES, claim, code_digest, evaluate, write
+    from baselines.benchmark.evaluate import EPISODES, claim, evaluate, write
+    from baselines.benchmark.provenance import trace_digest
     from baselines.benchmark.suite import find_suite
 
     episodes, changes = parsed.episodes or EPISODES, {} if parsed.engine is None else {"engine": parsed.engine}
@@ -58,7 +59,7 @@ def _suite(parsed: argparse.Namespace, out: Path) -> str:
         suite = find_suite(parsed.suite)
         if parsed.scenario:
             suite = suite.only(parsed.scenario)
-        code = code_digest()
+        code = trace_digest()
         result = evaluate(
             parsed.follower or ["akf"],
             suite,

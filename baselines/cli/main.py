@@ -38,11 +38,25 @@ class _Parser(argparse.ArgumentParser):
         self.exit(BAD_INPUT, f"{self.prog}: {message}; `{self.prog} --help` tells more.\n")
 
 
+class _Version(argparse.Action):
+    """Print the installed version and end; the package is imported only when it is asked for."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str) -> None:
+        super().__init__(option_strings, argparse.SUPPRESS, nargs=0, help="print the version")
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from follow_env import __version__
+
+        print(f"follow-env {__version__}")
+        parser.exit()
+
+
 def _parser() -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = _Parser(
         prog="follow",
         description="Measure how well a robot follows a person.",
     )
+    parser.add_argument("--version", action=_Version)
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     for command in (reproduce, bench, listing, train, export, watch, track, calibrate, speed, detector):
         command.add(commands)

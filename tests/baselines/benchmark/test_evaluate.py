@@ -2,6 +2,7 @@
 
 import csv
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from baselines.benchmark.evaluate import compare, evaluate
 from baselines.benchmark.metrics.base import METRICS, measured
 from baselines.benchmark.metrics.episode import COLUMNS, EpisodeMetrics
 from baselines.benchmark.player import play
+from baselines.benchmark.provenance import trace_digest
 from baselines.benchmark.rollout import rollout
 from baselines.benchmark.suite import SUITES, Suite, find_suite
 from baselines.benchmark.trace import Trace
@@ -160,6 +162,19 @@ def test_a_metric_is_added_without_a_replay(monkeypatch, tmp_path):
     gaps = [row["my_metrics:largest_gap"] for row in result.rows(["my_metrics:largest_gap"])]
     assert len(gaps) == 4
     assert min(gaps) > 1.4
+
+
+def test_the_code_of_a_metric_is_no_part_of_what_traces_share(monkeypatch):
+    """Defect of the past: a file more in the metrics' folder, and no run could be resumed."""
+    read, before = Path.read_bytes, trace_digest()
+
+    def changed(part):
+        return lambda path: read(path) + (b"#" if part in path.as_posix() else b"")
+
+    monkeypatch.setattr(Path, "read_bytes", changed("benchmark/metrics"))
+    assert trace_digest() == before
+    monkeypatch.setattr(Path, "read_bytes", changed("baselines/controllers"))
+    assert trace_digest() != before
 
 
 def test_a_drawn_scenario_plays_other_settings_in_each_episode():

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+import follow_env
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.store import FILE_NAME
 from baselines.cli import main as cli
@@ -100,6 +101,12 @@ def complaint(run: subprocess.CompletedProcess[str]) -> str:
     (sentence,) = [line for line in run.stderr.splitlines() if line.startswith("follow")]
     assert "Traceback" not in run.stderr
     return sentence
+
+
+def test_the_version_is_one_line(tmp_path: Path) -> None:
+    done = follow("--version", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == f"follow-env {follow_env.__version__}\n"
 
 
 def test_a_run_prints_its_tables_and_where_they_are(tmp_path: Path) -> None:

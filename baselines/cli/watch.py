@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from baselines.benchmark.cells import ESTIMATORS, PERCEPTIONS, SCENES, Cell
-from baselines.cli.arguments import Commands, add_seed, natural, output_file
+from baselines.cli.arguments import Commands, add_seed, add_trial, natural, output_file, trial_of
 from baselines.cli.exits import detecting
 
 
@@ -16,6 +16,7 @@ def add(commands: Commands) -> None:
     watch.add_argument("--estimator", choices=ESTIMATORS, default="akf", help="default: %(default)s")
     watch.add_argument("--perception", choices=PERCEPTIONS, default="mask", help="default: %(default)s")
     watch.add_argument("--scene", choices=SCENES, default="corridor", help="default: %(default)s")
+    add_trial(watch)
     add_seed(watch)
     watch.add_argument(
         "--video", type=output_file, default=Path("watch.mp4"), metavar="FILE", help="default: %(default)s"
@@ -32,7 +33,7 @@ def _run(parsed: argparse.Namespace) -> None:
     from baselines.viewing.watch import watch
 
     with detecting():
-        cell = Cell(parsed.perception, parsed.scene, parsed.estimator)
+        cell = trial_of(parsed) or Cell(parsed.perception, parsed.scene, parsed.estimator)
         renderer, size, shadows = parsed.renderer, parsed.size, parsed.shadows
         print(watch(cell, parsed.seed, parsed.video, renderer=renderer, size=size, shadows=shadows))
 

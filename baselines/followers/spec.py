@@ -24,7 +24,8 @@ class FollowerSpec:
         perception: where the measurement comes from.
         estimator: what filters it.
         controller: what drives by the estimate.
-        recovery: what drives while the person is lost; `"none"` stands still.
+        recovery: what drives while the person is lost; None is the perception's own: `detector` looks, as its tracker
+            asks for it, the others leave it to the estimate.
         policy: replaces the four parts: a registered policy, a shipped agent, an agent's or SB3's file, the folder of a
             training, `"module:object"`, or an object with `predict`.
         observation: environment mode that a policy of one's own reads; parts know theirs.
@@ -36,7 +37,7 @@ class FollowerSpec:
     perception: Any = "emulated"
     estimator: Any = "akf"
     controller: Any = "pi"
-    recovery: Any = "none"
+    recovery: Any = None
     policy: Any = None
     observation: str | None = None
     noise: Any = None
@@ -75,7 +76,7 @@ class FollowerSpec:
             return _short(self.policy)
         parts = f"{_short(self.estimator)} + {_short(self.controller)}"
         parts = parts if self.perception == "emulated" else f"{_short(self.perception)}, {parts}"
-        return parts if self.recovery == "none" else f"{parts}, {_short(self.recovery)}"
+        return parts if self.recovery is None else f"{parts}, recovery {_short(self.recovery)}"
 
     def to_json(self) -> dict[str, Any]:
         """Return the specification as plain data; `parse` makes it again.
@@ -117,6 +118,10 @@ def _parse_text(text: str) -> FollowerSpec:
         return FollowerSpec(policy=text, kind="learned")
     if Path(text).exists():
         return FollowerSpec(policy=text, kind="learned", label=Path(text).resolve().stem)
+    if text.startswith((".", "/", "~")) or text.endswith((".zip", ".safetensors")):
+        raise ValueError(
+            f"follower {text!r} is no file or folder; expected an agent's file, or one that `follow train` wrote"
+        )
     perception, _, rest = text.rpartition("/")
     estimator, _, controller = rest.partition("+")
     parts = {"perception": perception or "emulated", "estimator": estimator, "controller": controller or "pi"}

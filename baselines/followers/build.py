@@ -60,7 +60,7 @@ def observation_settings(spec: Any) -> dict[str, Any]:
     if isinstance(policy, Agent):
         size = {"camera": {"width": 84, "height": 84}} if policy.observation == "rgbd_uint8" else {}
         return {"obs": policy.observation, **size}
-    return {"obs": getattr(policy, "observation", "measurement")}
+    return {"obs": _reads(policy) or "measurement"}
 
 
 def build_follower(spec: Any, env: Any) -> Policy:
@@ -90,7 +90,7 @@ def build_follower(spec: Any, env: Any) -> Policy:
             )
         else:
             policy = Follower(perceive, make_estimator, make_controller, config.robot, config.dt, recovery, config)
-    check_match(policy, config, observation_settings(spec)["obs"])
+    check_match(policy, config, _mode(spec, policy))
     return policy
 
 
@@ -130,6 +130,21 @@ def check_match(policy: Any, config: EnvConfig, obs: str | None = None) -> None:
                 f"the follower was built for another {name} ({_difference(one, other)}); build it from this "
                 "environment: build_follower(spec, env)"
             )
+
+
+def _mode(spec: FollowerSpec, policy: Any) -> str | None:
+    """Return the observation mode that a follower reads, or None if nothing tells."""
+    if spec.policy is None:
+        return str(observation_settings(spec)["obs"])
+    return spec.observation or _reads(policy)
+
+
+def _reads(policy: Any) -> str | None:
+    """Return the observation mode that a policy says it reads, or that of the environment it was built for."""
+    told = getattr(policy, "observation", None)
+    if told is None and isinstance(built := getattr(policy, "config", None), EnvConfig):
+        told = built.obs
+    return told
 
 
 def _difference(one: Any, other: Any) -> str:

@@ -38,6 +38,12 @@ class SB3Policy:
         return self._model.observation_space
 
     @property
+    def observation(self) -> str | None:
+        """The environment's observation mode that it reads; None for eight numbers, which two modes have."""
+        settings = self.observation_settings
+        return settings["obs"] if "camera" in settings else None
+
+    @property
     def observation_settings(self) -> dict[str, Any]:
         """Settings of an environment whose observations it reads, told from its observation space.
 

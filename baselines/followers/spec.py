@@ -12,6 +12,7 @@ from typing import Any, Literal
 from follow_env.registry import choose
 
 Kind = Literal["classical", "learned", "reference", "own"]
+_PARTS = ("perception", "estimator", "controller", "recovery")
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class FollowerSpec:
         observation: environment mode that a policy of one's own reads; parts know theirs.
         noise: `NoiseModel` entries that replace what the sensor's settings give.
         label: how tables name it; by default made from the parts.
-        kind: what it is, as tables group it; nobody reads this out of the label.
+        kind: what it is, as tables group it; nobody reads this out of the label. `parse` fills it in from the parts.
     """
 
     perception: Any = "emulated"
@@ -60,7 +61,7 @@ class FollowerSpec:
         if isinstance(value, Mapping):
             for key in value:
                 choose("follower setting", key, [field.name for field in dataclasses.fields(cls)])
-            return cls(**value)
+            return cls(**{"kind": _kind_of(value), **value})
         if not isinstance(value, str | Path):
             if not hasattr(value, "predict"):
                 raise ValueError(f"follower is {value!r}; expected a text, a mapping, or an object with `predict`")
@@ -93,6 +94,21 @@ class FollowerSpec:
                 "'module:object'"
             ) from error
         return made
+
+
+def _kind_of(parts: Mapping[str, Any]) -> Kind:
+    """Return what a follower of these parts is, where nobody says it."""
+    from baselines.followers.references import POLICIES
+
+    policy = parts.get("policy")
+    if isinstance(policy, Mapping):
+        return "reference" if policy.get("name") in POLICIES else "own"
+    if policy is not None:
+        return FollowerSpec.parse(policy).kind
+    names = [part.get("name") if isinstance(part, Mapping) else part for part in map(parts.get, _PARTS)]
+    return (
+        "own" if any(name is not None and (not isinstance(name, str) or ":" in name) for name in names) else "classical"
+    )
 
 
 def _short(part: Any) -> str:

@@ -3,11 +3,13 @@
 import json
 import math
 import pickle
+import shutil
 
 import numpy as np
 import pytest
 
 from baselines.controllers import CONTROLLERS
+from baselines.followers.agents import weights_file
 from baselines.followers.build import build_follower, make_follower, observation_settings
 from baselines.followers.noise import noise_of
 from baselines.followers.references import POLICIES
@@ -318,3 +320,39 @@ def test_a_model_says_what_it_was_trained_to_see(tmp_path):
         PPO(policy, env, n_steps=8, batch_size=8, device="cpu").save(tmp_path / f"{mode}.zip")
         assert observation_settings(str(tmp_path / f"{mode}.zip")) == settings
         env.close()
+
+
+@pytest.mark.parametrize(
+    ("mapping", "kind"),
+    [
+        ({"estimator": {"name": "akf", "alpha": 0.1}}, "classical"),
+        ({"controller": Gentle}, "own"),
+        ({"estimator": {"name": "my_lab:ekf"}}, "own"),
+        ({"policy": "ppo-0", "label": "PPO"}, "learned"),
+        ({"policy": {"name": "oracle", "gain": 2.0}}, "reference"),
+        ({"policy": Straight(), "kind": "learned"}, "learned"),
+    ],
+)
+def test_a_mapping_has_the_kind_of_its_parts(mapping, kind):
+    assert FollowerSpec.parse(mapping).kind == kind
+
+
+def test_what_a_policy_reads_is_checked_only_where_it_is_known():
+    policy = Straight()
+    assert build_follower(policy, EnvConfig(obs="state")) is policy
+    built = build_follower("truth/akf", EnvConfig(obs="state"))
+    assert observation_settings(built) == {"obs": "state"}
+    assert build_follower(built, EnvConfig(obs="state")) is built
+    with pytest.raises(ValueError, match="reads obs='state'"):
+        build_follower(built, EnvConfig())
+
+
+def test_the_folder_of_a_training_is_a_follower(tmp_path):
+    shutil.copy(weights_file("ppo-0"), tmp_path)
+    observation = np.array((0.1, 2.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0), np.float32)
+    actions = [build_follower(name, EnvConfig()).predict(observation)[0] for name in (str(tmp_path), "ppo-0")]
+    assert np.array_equal(*actions)
+    assert observation_settings(tmp_path) == {"obs": "measurement"}
+    (tmp_path / "ppo-0.safetensors").unlink()
+    with pytest.raises(ValueError, match="holds no agent"):
+        build_follower(tmp_path, EnvConfig())

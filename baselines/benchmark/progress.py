@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import sys
 from collections.abc import Iterable, Iterator
 from typing import TypeVar
@@ -20,7 +21,7 @@ def progress(items: Iterable[Item], total: int, done: int = 0, unit: str = "epis
         done: Number that was finished before.
         unit: What a piece is called.
     """
-    if sys.stderr.isatty():
+    if sys.stderr.isatty() and importlib.util.find_spec("tqdm"):
         from tqdm import tqdm
 
         yield from tqdm(items, total=total, initial=done, unit=unit, dynamic_ncols=True, smoothing=0.05)

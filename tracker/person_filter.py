@@ -167,15 +167,19 @@ def moved(point: Vector, motion: Motion) -> Vector:
 def _line(samples: Sequence[tuple[float, Vector]]) -> tuple[Vector, Vector, float, float, float]:
     """Return the least-squares line at time 0 (position, velocity), the normal determinant, sum of squares and sum."""
     count = len(samples)
-    total = sum(time for time, _ in samples)
-    squares = sum(time * time for time, _ in samples)
+    total = squares = 0.0
+    for time, _ in samples:  # not sum(): from Python 3.12 on it rounds otherwise
+        total += time
+        squares += time * time
     determinant = count * squares - total * total
     if not 0.0 < determinant < math.inf:
         raise ValueError(f"the filter starts from {count} samples; expected at least two, at different finite times.")
     lines = []
     for axis in range(3):
-        first = sum(_finite(position)[axis] for _, position in samples)
-        moment = sum(time * position[axis] for time, position in samples)
+        first = moment = 0.0
+        for time, position in samples:
+            first += _finite(position)[axis]
+            moment += time * position[axis]
         lines.append(((squares * first - total * moment) / determinant, (count * moment - total * first) / determinant))
     (x, vx), (y, vy), (z, vz) = lines
     return (x, y, z), (vx, vy, vz), determinant, squares, total

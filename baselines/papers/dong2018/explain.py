@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from baselines.benchmark.cells import Cell
 from baselines.benchmark.statistics import NEGLIGIBLE, Difference, PooledError, weighted_share
 from baselines.papers.dong2018.table1 import PAPER_RMSE, UNITS, Table1, paper_ratio
@@ -132,7 +134,7 @@ def _correlation(table: Table1, perception: str, scene: str, quantity: str) -> s
 def _one_episode(table: Table1, perception: str, scene: str, quantity: str, estimator: str) -> str:
     """Whether a single episode decides an estimator's error, and what happened in it."""
     squares = table.error(perception, scene, estimator, quantity).squares.tolist()
-    share = max(squares) / sum(squares) if sum(squares) > 0.0 else 0.0
+    share = max(squares) / math.fsum(squares) if any(squares) else 0.0
     if share <= max(_ONE_EPISODE_SHARE, 3.0 / len(squares)):
         return ""
     row = table.cell(perception, scene, estimator)[squares.index(max(squares))]

@@ -19,6 +19,7 @@ that depth inside the gate, and so adopts the other person. Ours reports boxes w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
@@ -217,7 +218,7 @@ def _table_line(perception: str, name: str, prefix: str, rows: Sequence[Mapping[
     stopped = sum(row[f"{prefix}stop_time"] is not None and row[f"{prefix}wrong_frames"] == 0 for row in hidden)
     times = sorted(numbers(f"{prefix}stop_time"))
     median, late = (f"{np.quantile(times, q):.2f}" for q in (0.5, 0.95)) if times else ("", "")
-    minutes = sum(numbers("seconds_visible")) / 60.0
+    minutes = math.fsum(numbers("seconds_visible")) / 60.0
     cells = (
         perception,
         name,

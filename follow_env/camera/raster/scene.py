@@ -1,6 +1,7 @@
 """Pack a `Scene` into the arrays that the drawing kernels read, once."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -83,7 +84,7 @@ def pack_scene(scene: Scene) -> ScenePack:
         for face in range(FACES):
             axis, sign = face // 2, 2 * (face % 2) - 1
             normal = [sign * value for value in frame[axis]]
-            offset = sum(n * m for n, m in zip(normal, box.center, strict=True)) + 0.5 * box.size[axis]
+            offset = _dot(normal, box.center) + 0.5 * box.size[axis]
             first, second = (k for k in range(3) if k != axis)
             if box.material.texture == "wood" and box.size[first] < box.size[second]:
                 first, second = second, first  # the grain runs along the longer side
@@ -136,7 +137,14 @@ def _lamp(light: Light) -> list[float]:
 
 def _axis(axis: tuple[float, float, float], origin: tuple[float, float, float]) -> list[float]:
     """Return (ax, ay, az, a0) such that ax x + ay y + az z + a0 is the coordinate along `axis` from `origin`."""
-    return [*axis, -sum(a * o for a, o in zip(axis, origin, strict=True))]
+    return [*axis, -_dot(axis, origin)]
+
+
+def _dot(first: Sequence[float], second: Sequence[float]) -> float:
+    total = 0.0
+    for a, b in zip(first, second, strict=True):  # not sum(): from Python 3.12 on it rounds otherwise
+        total += a * b
+    return total
 
 
 def _table(rows: list[list[float]], columns: int) -> np.ndarray:

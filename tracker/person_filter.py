@@ -11,8 +11,10 @@ The acceleration is continuous white noise: several short predictions are exactl
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Sequence
+import operator
+from collections.abc import Iterable, Sequence
 
 Vector = tuple[float, float, float]
 Motion = tuple[float, float, float]
@@ -167,22 +169,23 @@ def moved(point: Vector, motion: Motion) -> Vector:
 def _line(samples: Sequence[tuple[float, Vector]]) -> tuple[Vector, Vector, float, float, float]:
     """Return the least-squares line at time 0 (position, velocity), the normal determinant, sum of squares and sum."""
     count = len(samples)
-    total = squares = 0.0
-    for time, _ in samples:  # not sum(): from Python 3.12 on it rounds otherwise
-        total += time
-        squares += time * time
+    total = _added(time for time, _ in samples)
+    squares = _added(time * time for time, _ in samples)
     determinant = count * squares - total * total
     if not 0.0 < determinant < math.inf:
         raise ValueError(f"the filter starts from {count} samples; expected at least two, at different finite times.")
     lines = []
     for axis in range(3):
-        first = moment = 0.0
-        for time, position in samples:
-            first += _finite(position)[axis]
-            moment += time * position[axis]
+        first = _added(_finite(position)[axis] for _, position in samples)
+        moment = _added(time * position[axis] for time, position in samples)
         lines.append(((squares * first - total * moment) / determinant, (count * moment - total * first) / determinant))
     (x, vx), (y, vy), (z, vz) = lines
     return (x, y, z), (vx, vy, vz), determinant, squares, total
+
+
+def _added(values: Iterable[float]) -> float:
+    """Return the sum, added from the left: Python's own is compensated from 3.12 on, which gives other bits."""
+    return functools.reduce(operator.add, values, 0.0)
 
 
 def _finite(position: Vector) -> Vector:

@@ -15,15 +15,13 @@ _LINES = 10
 def progress(items: Iterable[Item], total: int, done: int = 0, unit: str = "episode") -> Iterator[Item]:
     """Pass the items through and tell on stderr how many there have been.
 
-    The bar needs tqdm, which the extra `bench` brings; without it a terminal gets the lines.
-
     Args:
         items: Finished pieces of work, as they come.
         total: Number of pieces of the whole work.
         done: Number that was finished before.
         unit: What a piece is called.
     """
-    if sys.stderr.isatty() and importlib.util.find_spec("tqdm") is not None:
+    if sys.stderr.isatty() and importlib.util.find_spec("tqdm"):
         from tqdm import tqdm
 
         yield from tqdm(items, total=total, initial=done, unit=unit, dynamic_ncols=True, smoothing=0.05)

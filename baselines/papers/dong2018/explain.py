@@ -134,7 +134,8 @@ def _correlation(table: Table1, perception: str, scene: str, quantity: str) -> s
 def _one_episode(table: Table1, perception: str, scene: str, quantity: str, estimator: str) -> str:
     """Whether a single episode decides an estimator's error, and what happened in it."""
     squares = table.error(perception, scene, estimator, quantity).squares.tolist()
-    share = max(squares) / math.fsum(squares) if any(squares) else 0.0
+    total = math.fsum(squares)
+    share = max(squares) / total if total > 0.0 else 0.0
     if share <= max(_ONE_EPISODE_SHARE, 3.0 / len(squares)):
         return ""
     row = table.cell(perception, scene, estimator)[squares.index(max(squares))]

@@ -140,11 +140,9 @@ def _axis(axis: tuple[float, float, float], origin: tuple[float, float, float]) 
     return [*axis, -_dot(axis, origin)]
 
 
-def _dot(first: Sequence[float], second: Sequence[float]) -> float:
-    total = 0.0
-    for a, b in zip(first, second, strict=True):  # not sum(): from Python 3.12 on it rounds otherwise
-        total += a * b
-    return total
+def _dot(one: Sequence[float], other: Sequence[float]) -> float:
+    """Return the scalar product, added from the left: Python's `sum` of floats is not the same in every version."""
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 
 def _table(rows: list[list[float]], columns: int) -> np.ndarray:

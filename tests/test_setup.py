@@ -1,6 +1,5 @@
-"""The set-up: exact pins, packages that know only what lies below them, a Makefile that says what is missing."""
+"""The set-up: exact pins, and a Makefile that says what is missing."""
 
-import ast
 import importlib.metadata
 import os
 import re
@@ -72,36 +71,6 @@ def test_every_pin_installs_on_both_supported_pythons() -> None:
     for name in (PROJECT["name"], *requirements_of_the_project()):
         supported = SpecifierSet(importlib.metadata.metadata(name)["Requires-Python"] or "")
         assert [python for python in ("3.10", "3.11") if python not in supported] == [], name
-
-
-def test_importing_the_environments_imports_nothing_heavy() -> None:
-    heavy = {"pybullet", "torch", "numba", "cv2", "tracker", "baselines"}
-    script = f"import sys, follow_env; print(*sorted({heavy!r} & set(sys.modules)))"
-    imported = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert imported.stdout.split() == []
-
-
-@pytest.mark.parametrize(
-    ("package", "above"),
-    [("follow_env", {"tracker", "baselines"}), ("tracker", {"baselines"})],
-    ids=["follow_env", "tracker"],
-)
-def test_a_package_imports_nothing_from_above(package: str, above: set[str]) -> None:
-    files = sorted((ROOT / package).rglob("*.py"))
-    assert files, f"{package} holds no module"
-    wrong = []
-    for file in files:
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), str(file))):
-            if isinstance(node, ast.Import):
-                modules = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom) and node.level == 0:
-                modules = [node.module or ""]
-            else:
-                continue
-            wrong += [
-                f"{file.relative_to(ROOT)}:{node.lineno} imports {m}" for m in modules if m.split(".")[0] in above
-            ]
-    assert wrong == []
 
 
 def test_the_citation_names_the_version_of_the_project() -> None:

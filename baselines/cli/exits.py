@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -44,6 +45,18 @@ def detecting() -> Iterator[None]:
     except ModuleNotFoundError as error:
         sentence = f"the detector needs {error.name}; install it with pip install 'follow-env[learn]'"
         raise CommandError(sentence) from error
+
+
+def need(package: str, extra: str, purpose: str) -> None:
+    """End the command before its work begins where an optional package is missing.
+
+    Args:
+        package: Name by which it is imported.
+        extra: The extra of follow-env that brings it.
+        purpose: What needs it, as the sentence begins: `"the figures of this run"`.
+    """
+    if importlib.util.find_spec(package) is None:
+        raise CommandError(f"{purpose} need {package}; install it with pip install 'follow-env[{extra}]'", FAILED)
 
 
 @contextmanager

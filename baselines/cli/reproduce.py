@@ -7,7 +7,7 @@ from pathlib import Path
 
 from baselines.benchmark.cells import PERCEPTIONS
 from baselines.cli.arguments import Commands, add_jobs, positive
-from baselines.cli.exits import FAILED, CommandError, bad_input, detecting, keeping, playing
+from baselines.cli.exits import FAILED, CommandError, bad_input, detecting, keeping, need, playing
 
 
 def add(commands: Commands) -> None:
@@ -78,6 +78,7 @@ def _table1(parsed: argparse.Namespace) -> None:
     from baselines.papers.dong2018.reproduce import reproduce
 
     out = parsed.out or Path("results", "reproduced" if parsed.episodes is None else f"reproduced-{parsed.episodes}")
+    need("matplotlib", "bench", "the figures of this run")
     plan = Plan.of(parsed.perception or ["emulated", "mask"], parsed.episodes, list(calibration.family()))
     settings = dict(calibration.settings())
     if "detector" in plan.episodes:
@@ -97,6 +98,8 @@ def _astronaut(parsed: argparse.Namespace) -> None:
         from baselines.papers.zhang2018.reproduce import reproduce
     except ModuleNotFoundError as error:
         raise CommandError(f"{error.name} is missing; `pip install follow-env[learn]` brings it", FAILED) from error
+
+    need("matplotlib", "bench", "the figures of this run")
 
     def speeds(done: str, out: Path) -> None:
         repeats = min(parsed.episodes or table3.REPEATS, table3.REPEATS)

@@ -90,9 +90,9 @@ def draw_sensitivity(records: Sequence[Record], path: Path) -> None:
         records: ``studies.study_records`` of the sensitivity cells.
         path: The picture; its folder exists.
     """
-    from matplotlib.ticker import FuncFormatter, LogLocator
-
     with picture(path, width=7.2, height=5.8) as figure:
+        from matplotlib.ticker import FuncFormatter, LogLocator
+
         panels = _panels(figure, share_y="col")
         for scene, quantity, axes in panels:
             chosen = _select(records, scene=scene, quantity=quantity)
@@ -233,8 +233,18 @@ def _legend_below(figure: Figure, axes: Axes, columns: int) -> None:
 
 @contextmanager
 def picture(path: Path, width: float, height: float) -> Iterator[Figure]:
-    """A figure of the given size in inches, saved without a display and without anything that names the software."""
-    import matplotlib
+    """A figure of the given size in inches, saved without a display and without anything that names the software.
+
+    Raises:
+        ModuleNotFoundError: where Matplotlib is not installed; the message names the extra.
+    """
+    try:
+        import matplotlib
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            "drawing figures needs Matplotlib, which is not installed; run `pip install 'follow-env[bench]'`",
+            name=error.name,
+        ) from error
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from baselines.benchmark.cells import ESTIMATORS, PIXELS, Cell
-from baselines.followers.build import make_follower
+from baselines.benchmark.trial import Trial
+from baselines.followers.build import build_follower, make_follower, observation_settings
 from baselines.followers.calibration import detector_settings, noise_model, sensor
 from baselines.followers.perception import OBSERVATION_OF
 from baselines.followers.policy import Policy
@@ -115,6 +116,30 @@ def driver(cell: Cell, camera: Mapping[str, int] = CAMERA) -> Policy:
         detector=shipped_detector() if cell.perception == "detector" else None,
         bias=_bias(cell) if cell.controller == UNBIASED else (0.0, 0.0),
     )
+
+
+def settings_of(played: Cell | Trial, camera: Mapping[str, int] = CAMERA) -> dict[str, Any]:
+    """Return what `FollowEnv` is made with for a cell or a trial; `camera` is the size unless another is asked for."""
+    if isinstance(played, Cell):
+        return {**environment_kwargs(played), "camera": dict(camera)}
+    return {
+        "camera": dict(camera),
+        **played.scenario.settings,
+        **observation_settings(played.follower),
+        **played.changes,
+    }
+
+
+def policy_of(played: Cell | Trial, env: Any, camera: Mapping[str, int] = CAMERA) -> Policy:
+    """Return what drives in a cell or a trial."""
+    return driver(played, camera) if isinstance(played, Cell) else build_follower(played.follower, env)
+
+
+def title_of(played: Cell | Trial) -> str:
+    """Return how a picture or a dataset names a cell or a trial."""
+    if isinstance(played, Cell):
+        return f"{played.scene}, {played.perception}, {played.estimator} + PI"
+    return f"{played.suite} {played.scenario.name}, {played.follower.name}"
 
 
 @functools.cache

@@ -149,21 +149,23 @@ def evaluate(
     for name in suite.metrics:
         find_metric(name)
     seeds = range(first_seed, first_seed + episodes)
-    wanted = [(trial, seed) for trial in trials.values() for seed in seeds]
+    keys = {id(trial): trial.key for trial in trials.values()}
+    wanted = {(keys[id(trial)], seed): (trial, seed) for trial in trials.values() for seed in seeds}
     done: dict[tuple[str, int], Trace] = {}
     if kept is not None:
         kept.mkdir(parents=True, exist_ok=True)
-        for trial, seed in wanted:
-            if (file := _file(kept, trial, seed)).exists():
-                done[trial.key, seed] = Trace.load(file)
-    missing = [(trial, seed) for trial, seed in wanted if (trial.key, seed) not in done]
+        for key, seed in wanted:
+            if (file := _file(kept, key, seed)).exists():
+                done[key, seed] = Trace.load(file)
+    missing = [task for name, task in wanted.items() if name not in done]
     player = TrialPlayer()
     with contextlib.closing(play_all(player, missing, jobs)) as playing, contextlib.closing(player):
         for (trial, seed), trace in progress(playing, total=len(wanted), done=len(done)) if missing else ():
-            done[trial.key, seed] = trace
+            key = keys[id(trial)]
+            done[key, seed] = trace
             if kept is not None:
-                trace.save(_file(kept, trial, seed))
-    return Result(suite, specs, {cell: [done[trial.key, seed] for seed in seeds] for cell, trial in trials.items()})
+                trace.save(_file(kept, key, seed))
+    return Result(suite, specs, {cell: [done[keys[id(t)], seed] for seed in seeds] for cell, t in trials.items()})
 
 
 def compare(
@@ -208,8 +210,8 @@ def write(result: Result, out: Path, metrics: Sequence[str] | None, how: Mapping
 
 
 def code_digest() -> str:
-    """Return the hash of the code that plays: traces of one folder share it."""
-    return run_digest({})
+    """Return the hash of the code that plays, with the packages that compute: traces of one folder share it."""
+    return run_digest({"packages": packages()})
 
 
 def claim(out: Path, resume: bool, code: str) -> Path:
@@ -235,8 +237,8 @@ def claim(out: Path, resume: bool, code: str) -> Path:
     return traces
 
 
-def _file(folder: Path, trial: Trial, seed: int) -> Path:
-    return folder / f"{trial.key.replace('/', '_').replace(' ', '')}_{seed}.npz"
+def _file(folder: Path, key: str, seed: int) -> Path:
+    return folder / f"{key.replace('/', '_').replace(' ', '')}_{seed}.npz"
 
 
 def _told(value: Any) -> Any:

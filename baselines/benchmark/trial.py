@@ -7,8 +7,10 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
+from baselines.benchmark.identity import content, told
 from baselines.benchmark.trace import Trace
 from baselines.followers.spec import FollowerSpec
 from follow_env.domain import Domain
@@ -55,14 +57,17 @@ class Trial:
 
     @property
     def key(self) -> str:
-        """A name that is the same in every process, of what can be written down; objects count by their type's name."""
-        told = {
+        """A name that is the same in every process; another setting, object, own source or file gives another."""
+        spec = self.follower
+        file = Path(spec.policy) if isinstance(spec.policy, str | Path) else None
+        whole = {
             "scenario": [self.suite, self.scenario.name, self.scenario.version],
-            "settings": dict(self.scenario.settings),
-            "changes": dict(self.changes),
-            "follower": dataclasses.asdict(self.follower),
+            "settings": told(self.scenario.settings),
+            "changes": told(self.changes),
+            "follower": {part.name: told(getattr(spec, part.name)) for part in dataclasses.fields(spec)},
+            "file": None if file is None or not file.exists() else content(file),
         }
-        text = json.dumps(told, sort_keys=True, default=lambda part: f"{type(part).__module__}.{type(part).__name__}")
+        text = json.dumps(whole, sort_keys=True)
         return (
             f"{self.suite}/{self.scenario.name}/{self.follower.name}/{hashlib.sha256(text.encode()).hexdigest()[:12]}"
         )

@@ -5,7 +5,10 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
+
+if TYPE_CHECKING:
+    from baselines.benchmark.trial import Trial
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
@@ -20,6 +23,26 @@ def add_jobs(command: argparse.ArgumentParser) -> None:
 def add_seed(command: argparse.ArgumentParser) -> None:
     """Let the command take a seed."""
     command.add_argument("--seed", type=natural, default=0, metavar="S", help="default: %(default)s")
+
+
+def add_trial(command: argparse.ArgumentParser) -> None:
+    """Let the command take any follower in any scenario; see `trial_of`."""
+    command.add_argument("--follower", metavar="SPEC", help="any follower, as in `follow bench`, in a suite's scenario")
+    command.add_argument("--suite", default="paper", metavar="SUITE", help="of --follower (default: %(default)s)")
+    command.add_argument("--scenario", metavar="NAME", help="of the suite (default: its first)")
+
+
+def trial_of(parsed: argparse.Namespace) -> Trial | None:
+    """Return what `add_trial` asked for, or None without --follower; a ValueError says what is wrong with it."""
+    if parsed.follower is None:
+        return None
+    from baselines.benchmark.suite import find_suite
+    from baselines.benchmark.trial import Trial
+    from baselines.followers.spec import FollowerSpec
+
+    suite = find_suite(parsed.suite)
+    scenario = suite.scenarios[0] if parsed.scenario is None else suite.only([parsed.scenario]).scenarios[0]
+    return Trial(suite.name, scenario, FollowerSpec.parse(parsed.follower))
 
 
 def positive(text: str) -> int:

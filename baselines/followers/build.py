@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 import inspect
@@ -11,7 +12,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from baselines.controllers import CONTROLLERS
-from baselines.followers.agents import Agent, load_agent, shipped
+from baselines.followers.agents import CONTROL_HZ, Agent, load_agent, shipped
 from baselines.followers.calibration import noise_model
 from baselines.followers.follower import Follower
 from baselines.followers.noise import noise_of
@@ -53,10 +54,12 @@ def observation_settings(spec: Any) -> dict[str, Any]:
         seen = PERCEPTIONS.get(name) if isinstance(name, str) else name
         return {"obs": seen.observation}
     policy = _policy(spec, EnvConfig())
+    if isinstance(told := getattr(policy, "observation_settings", None), Mapping):
+        return dict(told)
     if isinstance(policy, Agent):
         size = {"camera": {"width": 84, "height": 84}} if policy.observation == "rgbd_uint8" else {}
         return {"obs": policy.observation, **size}
-    return {"obs": getattr(policy, "observation", "measurement")}
+    return {"obs": _reads(policy) or "measurement"}
 
 
 def build_follower(spec: Any, env: Any) -> Policy:
@@ -82,11 +85,11 @@ def build_follower(spec: Any, env: Any) -> Policy:
         make_estimator(), make_controller()
         if hasattr(perceive, "make_tracker"):
             policy = TrackingFollower(
-                perceive.make_tracker, make_estimator, make_controller, config.robot, config.dt, config
+                perceive.make_tracker, make_estimator, make_controller, config.robot, config.dt, config, recovery
             )
         else:
             policy = Follower(perceive, make_estimator, make_controller, config.robot, config.dt, recovery, config)
-    check_match(policy, config, observation_settings(spec)["obs"])
+    check_match(policy, config, _mode(spec, policy))
     return policy
 
 
@@ -111,6 +114,11 @@ def check_match(policy: Any, config: EnvConfig, obs: str | None = None) -> None:
             f"the follower reads obs={obs!r}, but the environment gives obs={config.obs!r}; make it with obs={obs!r} "
             "(`observation_settings` says what a follower needs)"
         )
+    if isinstance(policy, Agent) and (config.control_hz, config.action) != (CONTROL_HZ, "twist"):
+        raise ValueError(
+            f"the agent {policy.name} was trained at {CONTROL_HZ} Hz with action='twist', but the environment has "
+            f"control_hz={config.control_hz} and action={config.action!r}; make it with those of the training"
+        )
     built = getattr(policy, "config", None)
     if not isinstance(built, EnvConfig):
         return
@@ -123,6 +131,21 @@ def check_match(policy: Any, config: EnvConfig, obs: str | None = None) -> None:
             )
 
 
+def _mode(spec: FollowerSpec, policy: Any) -> str | None:
+    """Return the observation mode that a follower reads, or None if nothing tells."""
+    if spec.policy is None:
+        return str(observation_settings(spec)["obs"])
+    return spec.observation or _reads(policy)
+
+
+def _reads(policy: Any) -> str | None:
+    """Return the observation mode that a policy says it reads, or that of the environment it was built for."""
+    told = getattr(policy, "observation", None)
+    if told is None and isinstance(built := getattr(policy, "config", None), EnvConfig):
+        told = built.obs
+    return told
+
+
 def _difference(one: Any, other: Any) -> str:
     if not dataclasses.is_dataclass(one):
         return f"{one!r}, here {other!r}"
@@ -131,10 +154,14 @@ def _difference(one: Any, other: Any) -> str:
 
 
 def _fresh(registry: Registry[Any], part: Any, given: Any) -> Any:
-    """Return a new component of a specification; a class or a function is called, an object serves as it is."""
+    """Return a new component of a specification; a class or a function is called, an object is copied and reset."""
     if callable(part) and not isinstance(part, str | Mapping):
         return part(given)
-    return registry.build(part, given)
+    if isinstance(part, str | Mapping):
+        return registry.build(part, given)
+    fresh = copy.deepcopy(part)
+    fresh.reset()
+    return fresh
 
 
 def _noise(given: Any) -> NoiseModel:
@@ -168,6 +195,12 @@ def _load(path: Path) -> Policy:
         if not found:
             raise ValueError(f"{path} holds no agent; expected a folder that `follow train` wrote, or an SB3 zip")
         path = found[0]
+    return _read(path, path.stat().st_mtime_ns)
+
+
+@functools.lru_cache(maxsize=8)
+def _read(path: Path, written: int) -> Policy:
+    """Return the agent of a file, read once for all episodes until it is `written` again."""
     if path.suffix == ".zip":
         from baselines.followers.sb3 import SB3Policy
 

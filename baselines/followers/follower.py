@@ -13,6 +13,7 @@ from baselines.controllers.pi import PIController
 from baselines.followers.perception import Percept
 from baselines.followers.recovery import Recovery
 from follow_env.config import EnvConfig, RobotConfig
+from follow_env.world.robots.diff_drive import wheel_speeds
 from tracker.estimators import Estimate, Estimator
 from tracker.estimators.base import Pair
 
@@ -44,10 +45,10 @@ class Follower:
         perceive: turns one observation into (measurement, odometry twist).
         make_estimator: returns a fresh estimator for an episode.
         make_controller: returns a fresh controller for an episode.
-        robot: gives the scale of the twist action.
+        robot: gives the scale of the action.
         dt: control period, s.
         recovery: drives while measurements are missing.
-        config: what it was built for, if it was built for an environment.
+        config: what it was built for, if it was built for an environment; without one, actions are twists.
     """
 
     def __init__(
@@ -63,8 +64,7 @@ class Follower:
         self.config, self._recovery = config, recovery
         self._perceive = perceive
         self._make_estimator, self._make_controller = make_estimator, make_controller
-        robot = robot or RobotConfig()
-        self._scale = (robot.max_speed, robot.max_yaw_rate)
+        self._robot, self._kind = robot or RobotConfig(), config.action if config else "twist"
         self._dt = dt
 
     def predict(
@@ -83,7 +83,7 @@ class Follower:
             deterministic: followers always are.
 
         Returns:
-            Actions float32 in [-1, 1], (2,) or (n, 2): the twist as shares of the robot's limits.
+            Actions float32 in [-1, 1], (2,) or (n, 2): twist or wheel speeds as shares of the robot's limits.
         """
         batch = _split(observation)
         if batch is None:
@@ -117,8 +117,24 @@ class Follower:
         return self._action(*state.controller.command(state.estimate.bearing, state.estimate.distance, self._dt))
 
     def _action(self, v: float, omega: float) -> np.ndarray:
-        shares = (v / self._scale[0], omega / self._scale[1])
-        return np.array([min(max(share, -1.0), 1.0) for share in shares], np.float32)
+        return action_of(v, omega, self._robot, self._kind)
+
+
+def action_of(v: float, omega: float, robot: RobotConfig, kind: str = "twist") -> np.ndarray:
+    """Return the action (2,) float32 in [-1, 1] that asks a robot for a twist, cut to its limits.
+
+    Args:
+        v: forward, m/s.
+        omega: counter-clockwise, rad/s.
+        robot: whose limits scale the action.
+        kind: `"twist"`, or `"wheels"`: rim speeds (left, right), scaled together where one exceeds its limit.
+    """
+    shares = [min(max(share, -1.0), 1.0) for share in (v / robot.max_speed, omega / robot.max_yaw_rate)]
+    if kind == "wheels":
+        wheels = wheel_speeds(shares[0] * robot.max_speed, shares[1] * robot.max_yaw_rate, robot.track_width)
+        top = max(robot.max_wheel_speed, *(abs(wheel) for wheel in wheels))
+        shares = [wheel / top for wheel in wheels]
+    return np.array(shares, np.float32)
 
 
 def _split(observation: Any) -> list[Any] | None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from baselines.followers.calibration import detector_settings, settings
 from follow_env.config import EnvConfig
+from follow_env.registry import choose
 from tracker.estimators.base import NoiseModel, Pair
 from tracker.person_tracker import TrackerSettings
 
@@ -26,6 +27,9 @@ def noise_of(config: EnvConfig, perception: Any) -> NoiseModel:
     Args:
         config: of the environment.
         perception: a name or a mapping; one of one's own has the noise of `emulated`.
+
+    Raises:
+        ValueError: for a depth rule whose noise was not calibrated; give the follower's `noise`.
     """
     name = perception["name"] if isinstance(perception, Mapping) else perception
     rule = perception.get("rule", "six_smallest") if isinstance(perception, Mapping) else "six_smallest"
@@ -35,7 +39,8 @@ def noise_of(config: EnvConfig, perception: Any) -> NoiseModel:
         variances = detector_settings()["noise"]["detector/six_smallest"]["corridor"]["measurement"]
         slower *= TrackerSettings.for_rate(config.control_hz).every
     elif name == "mask":
-        variances = settings()["noise"][f"mask/{rule}"]["corridor"]["measurement"]
+        noise = settings()["noise"]
+        variances = noise[choose("calibrated noise of", f"mask/{rule}", noise)]["corridor"]["measurement"]
     elif name == "truth":
         variances = settings()["noise"]["truth/exact"]["corridor"]["measurement"]
     else:

@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -118,6 +118,7 @@ class Mask:
     observation = "rgbd_box"
 
     def __init__(self, config: EnvConfig, rule: Rule = "six_smallest") -> None:
+        choose("depth rule", rule, get_args(Rule))
         self._measure = BoxPerception(config.intrinsics, config.mount.forward, rule)
 
     def __call__(self, observation: Mapping[str, np.ndarray]) -> Percept:
@@ -132,16 +133,20 @@ class Detected:
     observation = "rgbd"
 
     def __init__(self, config: EnvConfig, detector: Detector | None = None) -> None:
-        if detector is None:
-            from tracker.detection.detector import PersonDetector
-
-            detector = PersonDetector()
-        settings = TrackerSettings.for_rate(config.control_hz)
+        settings, detector = TrackerSettings.for_rate(config.control_hz), detector or _shipped_detector()
         self.make_tracker = functools.partial(PersonTracker, detector, config.intrinsics, config.mount, settings)
 
     def __call__(self, observation: Mapping[str, np.ndarray]) -> Percept:
         """Return the odometry; the tracker measures."""
         return perceive_odometry(observation)
+
+
+@functools.cache
+def _shipped_detector() -> Detector:
+    """Return the shipped detector, loaded once: it has no memory."""
+    from tracker.detection.detector import PersonDetector
+
+    return PersonDetector()
 
 
 OBSERVATION_OF = {name: PERCEPTIONS.get(name).observation for name in PERCEPTIONS}

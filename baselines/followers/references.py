@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from baselines.followers.follower import action_of
 from follow_env.config import EnvConfig
 from follow_env.registry import Registry
 from tracker.estimators import Estimate
@@ -80,7 +81,7 @@ class Oracle:
     def __init__(self, config: EnvConfig | None = None, gain: float = 4.0) -> None:
         self.config, self._gain = config, gain
         config = config or EnvConfig()
-        self._robot, self._set_point = config.robot, config.task.set_point
+        self._robot, self._kind, self._set_point = config.robot, config.action, config.task.set_point
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: np.ndarray | None = None, deterministic: bool = True
@@ -91,5 +92,4 @@ class Oracle:
         y = d * math.tan(min(max(bearing, -1.2), 1.2))
         omega = (left + self._gain * y) / d
         v = ahead + omega * y + self._gain * (distance - self._set_point)
-        shares = (v / self._robot.max_speed, omega / self._robot.max_yaw_rate)
-        return np.array([min(max(share, -1.0), 1.0) for share in shares], np.float32), NoState()
+        return action_of(v, omega, self._robot, self._kind), NoState()

@@ -37,6 +37,28 @@ class SB3Policy:
         """What the model was trained on."""
         return self._model.observation_space
 
+    @property
+    def observation(self) -> str | None:
+        """The environment's observation mode that it reads; None for eight numbers, which two modes have."""
+        settings = self.observation_settings
+        return settings["obs"] if "camera" in settings else None
+
+    @property
+    def observation_settings(self) -> dict[str, Any]:
+        """Settings of an environment whose observations it reads, told from its observation space.
+
+        Eight numbers are taken for `measurement`: a model of `state` needs `observation="state"` in its specification.
+        """
+        space = self.observation_space
+        shape = space["depth"].shape if hasattr(space, "keys") and "depth" in space.keys() else space.shape  # noqa: SIM118
+        if shape is not None and len(shape) == 2:
+            mode = "rgbd_box" if "box" in space.keys() else "rgbd"  # noqa: SIM118 (not a mapping)
+            return {"obs": mode, "camera": {"height": shape[0], "width": shape[1]}}
+        if shape is not None and len(shape) == 3:
+            height, width = shape[1:] if shape[0] == 4 else shape[:2]  # SB3 puts the channels first
+            return {"obs": "rgbd_uint8", "camera": {"height": height, "width": width}}
+        return {"obs": "measurement"}
+
     def predict(
         self,
         observation: Any,

@@ -12,6 +12,7 @@ from typing import Any, Literal
 from follow_env.registry import choose
 
 Kind = Literal["classical", "learned", "reference", "own"]
+_PARTS = ("perception", "estimator", "controller", "recovery")
 
 
 @dataclass(frozen=True)
@@ -24,19 +25,20 @@ class FollowerSpec:
         perception: where the measurement comes from.
         estimator: what filters it.
         controller: what drives by the estimate.
-        recovery: what drives while the person is lost; `"none"` stands still.
+        recovery: what drives while the person is lost; None is the perception's own: `detector` looks, as its tracker
+            asks for it, the others leave it to the estimate.
         policy: replaces the four parts: a registered policy, a shipped agent, an agent's or SB3's file, the folder of a
             training, `"module:object"`, or an object with `predict`.
         observation: environment mode that a policy of one's own reads; parts know theirs.
         noise: `NoiseModel` entries that replace what the sensor's settings give.
         label: how tables name it; by default made from the parts.
-        kind: what it is, as tables group it; nobody reads this out of the label.
+        kind: what it is, as tables group it; nobody reads this out of the label. `parse` fills it in from the parts.
     """
 
     perception: Any = "emulated"
     estimator: Any = "akf"
     controller: Any = "pi"
-    recovery: Any = "none"
+    recovery: Any = None
     policy: Any = None
     observation: str | None = None
     noise: Any = None
@@ -59,7 +61,7 @@ class FollowerSpec:
         if isinstance(value, Mapping):
             for key in value:
                 choose("follower setting", key, [field.name for field in dataclasses.fields(cls)])
-            return cls(**value)
+            return cls(**{"kind": _kind_of(value), **value})
         if not isinstance(value, str | Path):
             if not hasattr(value, "predict"):
                 raise ValueError(f"follower is {value!r}; expected a text, a mapping, or an object with `predict`")
@@ -75,7 +77,7 @@ class FollowerSpec:
             return _short(self.policy)
         parts = f"{_short(self.estimator)} + {_short(self.controller)}"
         parts = parts if self.perception == "emulated" else f"{_short(self.perception)}, {parts}"
-        return parts if self.recovery == "none" else f"{parts}, {_short(self.recovery)}"
+        return parts if self.recovery is None else f"{parts}, recovery {_short(self.recovery)}"
 
     def to_json(self) -> dict[str, Any]:
         """Return the specification as plain data; `parse` makes it again.
@@ -92,6 +94,21 @@ class FollowerSpec:
                 "'module:object'"
             ) from error
         return made
+
+
+def _kind_of(parts: Mapping[str, Any]) -> Kind:
+    """Return what a follower of these parts is, where nobody says it."""
+    from baselines.followers.references import POLICIES
+
+    policy = parts.get("policy")
+    if isinstance(policy, Mapping):
+        return "reference" if policy.get("name") in POLICIES else "own"
+    if policy is not None:
+        return FollowerSpec.parse(policy).kind
+    names = [part.get("name") if isinstance(part, Mapping) else part for part in map(parts.get, _PARTS)]
+    return (
+        "own" if any(name is not None and (not isinstance(name, str) or ":" in name) for name in names) else "classical"
+    )
 
 
 def _short(part: Any) -> str:
@@ -117,6 +134,10 @@ def _parse_text(text: str) -> FollowerSpec:
         return FollowerSpec(policy=text, kind="learned")
     if Path(text).exists():
         return FollowerSpec(policy=text, kind="learned", label=Path(text).resolve().stem)
+    if text.startswith((".", "/", "~")) or text.endswith((".zip", ".safetensors")):
+        raise ValueError(
+            f"follower {text!r} is no file or folder; expected an agent's file, or one that `follow train` wrote"
+        )
     perception, _, rest = text.rpartition("/")
     estimator, _, controller = rest.partition("+")
     parts = {"perception": perception or "emulated", "estimator": estimator, "controller": controller or "pi"}

@@ -13,9 +13,10 @@ from baselines.controllers import Controller
 from baselines.controllers.pi import PIController
 from baselines.followers.follower import Follower, FollowerState
 from baselines.followers.perception import perceive_odometry
-from baselines.followers.recovery import look_rate
+from baselines.followers.recovery import Recovery, look_rate
 from follow_env.config import EnvConfig, RobotConfig
 from tracker.estimators import Estimator
+from tracker.estimators.base import Pair
 from tracker.person_tracker import PersonTracker, Track
 
 
@@ -50,6 +51,8 @@ class TrackingFollower(Follower):
     Args:
         make_tracker: returns a fresh tracker for an episode; its rate is that of the observations.
         make_estimator, make_controller, robot, dt, config: as in `Follower`.
+        recovery: drives while nobody is tracked, in place of the turns described; where it returns None the robot
+            stands.
     """
 
     def __init__(
@@ -60,9 +63,10 @@ class TrackingFollower(Follower):
         robot: RobotConfig | None = None,
         dt: float = 1.0 / 30.0,
         config: EnvConfig | None = None,
+        recovery: Recovery | None = None,
     ) -> None:
         super().__init__(perceive_odometry, make_estimator, make_controller, robot, dt, config=config)
-        self._make_tracker = make_tracker
+        self._make_tracker, self._look = make_tracker, recovery
 
     def _step(self, observation: Any, state: Any) -> tuple[np.ndarray, FollowerState]:
         if state is None:
@@ -81,6 +85,8 @@ class TrackingFollower(Follower):
         state.measurement = state.estimate = None
         if state.bearing is None or track.state == "confirming":
             return self._action(0.0, 0.0), state
-        rate = look_rate(state.bearing, state.looked)
+        turn: Pair | None = (0.0, look_rate(state.bearing, state.looked))
+        if self._look is not None:
+            turn = self._look.command(state.bearing, state.looked)
         state.looked += self._dt
-        return self._action(0.0, rate), state
+        return self._action(*(turn or (0.0, 0.0))), state

@@ -13,20 +13,21 @@ from minari import MinariDataset
 from minari.data_collector import EpisodeBuffer
 from minari.dataset.minari_dataset import parse_dataset_id
 
-from baselines.benchmark.build import driver, environment_kwargs
+from baselines.benchmark.build import environment_kwargs, policy_of, settings_of
 from baselines.benchmark.cells import ENVIRONMENT_IDS, Cell
 from baselines.benchmark.store import InputError
+from baselines.benchmark.trial import Trial
 
 INFO = ("bearing", "distance", "visible", "collision", "is_success")
 """What is kept of the environment's info beside observation, action and reward."""
 
 
-def export(cell: Cell, seeds: Iterable[int], dataset_id: str) -> MinariDataset:
+def export(played: Cell | Trial, seeds: Iterable[int], dataset_id: str) -> MinariDataset:
     """Play the episodes of a cell and store them in Minari's local folder (`MINARI_DATASETS_PATH` names another).
 
     Args:
-        cell: perception, scene and who drives.
-        seeds: one for each episode; episodes of one cell and seed are the same everywhere.
+        played: perception, scene and who drives, or a follower in a scenario.
+        seeds: one for each episode; episodes of one follower and seed are the same everywhere.
         dataset_id: of Minari, for example `follow_env/corridor/akf-v0`.
 
     Raises:
@@ -40,22 +41,30 @@ def export(cell: Cell, seeds: Iterable[int], dataset_id: str) -> MinariDataset:
         parse_dataset_id(dataset_id)
     except ValueError as error:
         raise InputError(f"{dataset_id!r} is no name of a Minari dataset: {error}") from error
-    env = gym.make(ENVIRONMENT_IDS[cell.scene], **environment_kwargs(cell))
+    settings = environment_kwargs(played) if isinstance(played, Cell) else settings_of(played, {})
+    scene = settings.get("scene", "corridor")
+    env = gym.make(ENVIRONMENT_IDS.get(scene, ENVIRONMENT_IDS["corridor"]), **{**settings, "scene": scene})
     try:
-        buffers = [_play(env, driver(cell), seed) for seed in seeds]
+        buffers = [_play(env, policy_of(played, env), seed) for seed in seeds]
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", category=UserWarning, module="minari")  # what it recommends to add
             return minari.create_dataset_from_buffers(
                 dataset_id,
                 buffers,
                 env=env,
-                algorithm_name=f"{cell.estimator} + PI" if cell.controller == "pi" else cell.controller,
+                algorithm_name=_driver_name(played),
                 author="follow-env authors",
                 requirements=["follow-env"],
-                description=f"{cell.key}, {len(buffers)} episodes of follow-env's PyBullet environment",
+                description=f"{played.key}, {len(buffers)} episodes of follow-env's PyBullet environment",
             )
     finally:
         env.close()
+
+
+def _driver_name(played: Cell | Trial) -> str:
+    if isinstance(played, Trial):
+        return played.follower.name
+    return f"{played.estimator} + PI" if played.controller == "pi" else played.controller
 
 
 def _play(env: gym.Env, policy: Any, seed: int) -> EpisodeBuffer:

@@ -13,8 +13,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from baselines.benchmark.build import driver, environment_kwargs
+from baselines.benchmark.build import policy_of, settings_of, title_of
 from baselines.benchmark.cells import Cell
+from baselines.benchmark.trial import Trial
 from baselines.followers.tracking_follower import TrackingState
 from baselines.viewing.video import VideoWriter
 from follow_env.camera import PinholeCamera, Renderer, make_renderer
@@ -28,7 +29,7 @@ SHEET_PICTURES, SHEET_WIDTH = 4, 720
 
 
 def watch(
-    cell: Cell,
+    played: Cell | Trial,
     seed: int,
     video: Path,
     camera: tuple[int, int] = CAMERA,
@@ -39,7 +40,7 @@ def watch(
     """Play an episode, write a video and a contact sheet, and return a summary.
 
     Args:
-        cell: perception, scene and estimator.
+        played: perception, scene and estimator, or a follower in a scenario.
         seed: of the episode.
         video: the MP4 file; the sheet is the PNG of the same name.
         camera: width and height of the robot's picture, px.
@@ -60,12 +61,12 @@ def watch(
     if size is not None and any(side % 2 for side in size):
         raise ValueError(f"--size is {size[0]}x{size[1]}; expected even numbers, which MPEG-4 wants")
     picture_size = {"width": camera[0], "height": camera[1]}
-    env = FollowEnv(**{**environment_kwargs(cell), "camera": picture_size, "renderer": renderer})
+    env = FollowEnv(**{**settings_of(played, picture_size), "renderer": renderer})
     view = None if size is None else _make_view(renderer, env.scene, env.camera.config, size, shadows)
-    title = f"{cell.scene}, {cell.perception}, {cell.estimator} + PI"
+    title = title_of(played)
     dashboard = Dashboard(env.scene, env.camera, env.config.robot.camera_forward, title)
-    policy, state = driver(cell, picture_size), None
     observation, info = env.reset(seed=seed)
+    policy, state = policy_of(played, env, picture_size), None
     small: list[np.ndarray] = []
     with contextlib.ExitStack() as parts:
         writer = parts.enter_context(VideoWriter(video, round(1.0 / env.dt)))
@@ -77,10 +78,11 @@ def watch(
             action, state = policy.predict(observation, state)
             if view is None:
                 seen = env.observed or env.frame()
-                box = tuple(observation["box"].tolist()) if cell.perception == "mask" else seen.person_box()
+                box = tuple(observation["box"].tolist()) if env.config.obs == "rgbd_box" else seen.person_box()
                 if isinstance(state, TrackingState) and state.track is not None:
                     box, dashboard.title = state.track.box, f"{title}: {state.track.state}"
-                estimate = None if state.estimate is None else (state.estimate.bearing, state.estimate.distance)
+                told = getattr(state, "estimate", None)
+                estimate = None if told is None else (told.bearing, told.distance)
                 dashboard.update(info, seen, box, estimate)
                 picture = dashboard.image()
             else:

@@ -14,9 +14,10 @@ from baselines.benchmark.player import play
 from baselines.benchmark.rollout import rollout
 from baselines.benchmark.suite import SUITES, Suite, find_suite
 from baselines.benchmark.trace import Trace
-from baselines.benchmark.trial import Scenario
+from baselines.benchmark.trial import Scenario, Trial
 from baselines.cli.main import main
 from baselines.followers.build import build_follower
+from baselines.followers.spec import FollowerSpec
 from follow_env.envs.follow import FollowEnv
 
 SHORT = {"name": "path", "points": [[2.0, 0.0]]}
@@ -95,6 +96,49 @@ def test_a_stateless_policy_gets_its_row_and_its_paired_difference():
     low, high = (line[f"distance_tracking_rmse_m_minus_reference_{end}"] for end in ("low", "high"))
     assert low <= line["distance_tracking_rmse_m_minus_reference"] <= high
     assert "Stateless" in result.markdown()
+
+
+class Gain:
+    """A policy with a setting."""
+
+    def __init__(self, gain):
+        self.gain = gain
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return np.clip((self.gain * (observation[1] - 1.5), observation[0]), -1.0, 1.0), None
+
+
+def test_two_objects_of_one_class_are_two_followers(tmp_path):
+    """Defect of the past: their traces had one key, so that the second's stood for both."""
+    both = [Gain(0.2), Gain(2.0)]
+    (difference,) = compare(*both, SUITE.only(["ahead"]), episodes=2, kept=tmp_path, engine="kinematic").values()
+    assert difference.value > 0.01
+    alone = [evaluate(one, SUITE.only(["ahead"]), episodes=2, engine="kinematic").rows() for one in both]
+    assert alone == [
+        evaluate(one, SUITE.only(["ahead"]), episodes=2, kept=tmp_path, engine="kinematic").rows() for one in both
+    ]
+
+
+def test_what_changed_since_is_played_again(monkeypatch, tmp_path):
+    """An own module, a module that it uses, or the file of an agent, under the same name as before."""
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "gains.py").write_text("def gain():\n    return 1.0\n", encoding="utf-8")
+    (tmp_path / "driver.py").write_text("from gains import gain\nclass Mine:\n    pass\n", encoding="utf-8")
+    agent = tmp_path / "agent.zip"
+    agent.write_bytes(b"first")
+
+    def keys():
+        specs = (FollowerSpec(policy="driver:Mine"), FollowerSpec(policy=str(agent)), FollowerSpec())
+        return [Trial("short", SUITE.scenarios[0], spec).key for spec in specs]
+
+    first = keys()
+    assert keys() == first
+    (tmp_path / "gains.py").write_text("def gain():\n    return 2.0\n", encoding="utf-8")
+    agent.write_bytes(b"second")
+    own, file, built = keys()
+    assert own != first[0]
+    assert file != first[1]
+    assert built == first[2]
 
 
 def test_the_paired_difference_of_a_follower_to_itself_is_nothing():

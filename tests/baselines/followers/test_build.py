@@ -3,11 +3,13 @@
 import json
 import math
 import pickle
+import shutil
 
 import numpy as np
 import pytest
 
 from baselines.controllers import CONTROLLERS
+from baselines.followers.agents import weights_file
 from baselines.followers.build import build_follower, make_follower, observation_settings
 from baselines.followers.noise import noise_of
 from baselines.followers.references import POLICIES
@@ -260,3 +262,97 @@ def test_a_model_of_stable_baselines3_is_a_follower(tmp_path):
     (tmp_path / "no.zip").write_bytes(b"nothing")
     with pytest.raises(ValueError, match="is no model of Stable-Baselines3"):
         build_follower(str(tmp_path / "no.zip"), FollowEnv(engine="kinematic"))
+
+
+@pytest.mark.parametrize("name", ["akf", "oracle"])
+def test_wheels_are_driven_like_twists(name):
+    """The same twist asked of either action space: the paths are one but for float32."""
+    records = []
+    for action in ("twist", "wheels"):
+        env = FollowEnv(engine="kinematic", action=action, **observation_settings(name))
+        records.append(drive(build_follower(name, env), env))
+    assert records[0].shape == records[1].shape
+    assert np.abs(records[0] - records[1]).max() < 1e-3
+
+
+def test_an_estimator_given_as_an_object_is_not_shared_by_episodes():
+    own = KalmanFilter((1e-4, 1e-4), (1e-3, 1e-3))
+    env = FollowEnv(engine="kinematic")
+    follower = build_follower({"estimator": own}, env)
+    first, second = drive(follower, env, 40), drive(follower, env, 40)
+    assert np.array_equal(first, second)
+    assert own.update(None) is None
+
+
+@pytest.mark.parametrize("changes", [{"control_hz": 60}, {"action": "wheels"}])
+def test_an_agent_drives_only_as_it_was_trained(changes):
+    with pytest.raises(ValueError, match=r"ppo-0 was trained at 30 Hz with action='twist', but .*make it with"):
+        build_follower("ppo-0", EnvConfig.of(changes))
+
+
+@pytest.mark.parametrize("path", ["runs/mine.zip", "./mine", "/nowhere/agent.safetensors"])
+def test_a_path_that_is_not_there_is_called_so(path):
+    with pytest.raises(ValueError, match=r"is no file or folder"):
+        FollowerSpec.parse(path)
+
+
+def test_a_depth_rule_without_calibrated_noise_asks_for_it():
+    spec = {"perception": {"name": "mask", "rule": "grid_median"}}
+    config = EnvConfig(obs="rgbd_box")
+    with pytest.raises(ValueError, match="calibrated noise of 'mask/grid_median'"):
+        build_follower(spec, config)
+    noise = {"measurement": (1e-4, 1e-3), "process": (1e-4, 1e-4), "acceleration": (0.1, 0.1)}
+    build_follower({**spec, "noise": noise}, config)
+    with pytest.raises(ValueError, match=r"depth rule 'grid_medan'.*did you mean 'grid_median'"):
+        build_follower({"perception": {"name": "mask", "rule": "grid_medan"}}, config)
+
+
+def test_a_model_says_what_it_was_trained_to_see(tmp_path):
+    from stable_baselines3 import PPO
+
+    asked = {
+        "rgbd_uint8": {"obs": "rgbd_uint8", "camera": {"height": 48, "width": 64}},
+        "measurement": {"obs": "measurement"},
+    }
+    for mode, settings in asked.items():
+        env = FollowEnv(engine="kinematic", obs=mode, camera={"width": 64, "height": 48})
+        policy = "CnnPolicy" if mode == "rgbd_uint8" else "MlpPolicy"
+        PPO(policy, env, n_steps=8, batch_size=8, device="cpu").save(tmp_path / f"{mode}.zip")
+        assert observation_settings(str(tmp_path / f"{mode}.zip")) == settings
+        env.close()
+
+
+@pytest.mark.parametrize(
+    ("mapping", "kind"),
+    [
+        ({"estimator": {"name": "akf", "alpha": 0.1}}, "classical"),
+        ({"controller": Gentle}, "own"),
+        ({"estimator": {"name": "my_lab:ekf"}}, "own"),
+        ({"policy": "ppo-0", "label": "PPO"}, "learned"),
+        ({"policy": {"name": "oracle", "gain": 2.0}}, "reference"),
+        ({"policy": Straight(), "kind": "learned"}, "learned"),
+    ],
+)
+def test_a_mapping_has_the_kind_of_its_parts(mapping, kind):
+    assert FollowerSpec.parse(mapping).kind == kind
+
+
+def test_what_a_policy_reads_is_checked_only_where_it_is_known():
+    policy = Straight()
+    assert build_follower(policy, EnvConfig(obs="state")) is policy
+    built = build_follower("truth/akf", EnvConfig(obs="state"))
+    assert observation_settings(built) == {"obs": "state"}
+    assert build_follower(built, EnvConfig(obs="state")) is built
+    with pytest.raises(ValueError, match="reads obs='state'"):
+        build_follower(built, EnvConfig())
+
+
+def test_the_folder_of_a_training_is_a_follower(tmp_path):
+    shutil.copy(weights_file("ppo-0"), tmp_path)
+    observation = np.array((0.1, 2.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0), np.float32)
+    actions = [build_follower(name, EnvConfig()).predict(observation)[0] for name in (str(tmp_path), "ppo-0")]
+    assert np.array_equal(*actions)
+    assert observation_settings(tmp_path) == {"obs": "measurement"}
+    (tmp_path / "ppo-0.safetensors").unlink()
+    with pytest.raises(ValueError, match="holds no agent"):
+        build_follower(tmp_path, EnvConfig())

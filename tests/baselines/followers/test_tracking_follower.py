@@ -1,12 +1,14 @@
 """The follower that sees with the tracker, in closed loop, with a detector that knows whose pixels are whose."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from baselines.followers.build import make_follower
+from baselines.followers.build import build_follower, make_follower
 from baselines.followers.recovery import LOOK_RATE
 from baselines.followers.tracking_follower import TrackingFollower
-from follow_env.config import CameraConfig, RobotConfig
+from follow_env.config import CameraConfig, EnvConfig, RobotConfig
 from follow_env.envs.follow import FollowEnv
 from tracker.boxes import Detection
 
@@ -102,3 +104,24 @@ def test_episodes_do_not_share_a_tracker(env):
     _, second = follower.predict(observation, first, episode_start=np.array([True]))
     assert isinstance(follower, TrackingFollower)
     assert second.tracker is not first.tracker
+
+
+@pytest.mark.parametrize(("recovery", "rate"), [(None, LOOK_RATE), ("none", 0.0), ({"name": "look", "rate": 0.2}, 0.2)])
+def test_a_recovery_of_ones_own_replaces_the_look(recovery, rate):
+    spec = {"perception": {"name": "detector", "detector": object()}, "recovery": recovery}
+    config = EnvConfig.of({"obs": "rgbd", "camera": CAMERA})
+    follower = build_follower(spec, config)
+    follower._make_tracker = Lost
+    frame = {"rgb": None, "depth": np.zeros((2, 2)), "twist": np.zeros(2)}
+    _, state = follower.predict(frame)
+    state.bearing = 0.3
+    for _ in range(30):
+        action, state = follower.predict(frame, state)
+    assert action[1] == pytest.approx(rate / config.robot.max_yaw_rate)
+
+
+class Lost:
+    """A tracker that has nobody."""
+
+    def update(self, rgb, depth, twist):
+        return SimpleNamespace(bearing=None, alarm=False, state="lost")

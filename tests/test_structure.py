@@ -14,7 +14,7 @@ from follow_env.registry import Registry, load
 
 ROOT = Path(__file__).parents[1]
 FLOORS = ("follow_env", "tracker", "baselines")
-VOCABULARIES = "ESTIMATORS|SCENES|ROUTES|CONTROLLERS|PERCEPTIONS|SUITES|BODIES|OUTFITS|SENSORS|RENDERERS"
+VOCABULARIES = "ESTIMATORS|SCENES|ROUTES|CONTROLLERS|PERCEPTIONS|SUITES|BODIES|OUTFITS|SENSORS|RENDERERS|RECIPES"
 
 
 def modules(package):
@@ -42,7 +42,7 @@ def within(name, package):
         ("follow_env", ("tracker", "baselines", "torch", "stable_baselines3", "matplotlib")),
         ("tracker", ("baselines", "pybullet", "gymnasium", "stable_baselines3", "follow_env.envs", "follow_env.world")),
         ("baselines/benchmark", ("baselines.papers", "baselines.suites")),
-        ("baselines/followers", ("baselines.papers", "baselines.suites", "baselines.benchmark")),
+        ("baselines/followers", ("baselines.papers", "baselines.suites", "baselines.benchmark", "baselines.learned")),
         ("baselines/controllers", ("baselines.followers", "baselines.benchmark", "torch")),
         ("follow_env/world", ("gymnasium", "follow_env.envs")),
         ("follow_env/camera", ("gymnasium", "follow_env.envs")),

@@ -22,6 +22,7 @@ REGISTRIES = {
     "controllers": "baselines.controllers:CONTROLLERS",
     "recoveries": "baselines.followers.recovery:RECOVERIES",
     "policies": "baselines.followers.references:POLICIES",
+    "recipes": "baselines.learned.recipes:RECIPES",
     "suites": "baselines.benchmark.suite:SUITES",
     "metrics": "baselines.benchmark.metrics.base:METRICS",
 }

@@ -7,7 +7,7 @@ import dataclasses
 from pathlib import Path
 
 from baselines.cli.arguments import Commands, add_seed, positive
-from baselines.cli.exits import bad_input
+from baselines.cli.exits import bad_input, need
 
 
 def add(commands: Commands) -> None:
@@ -15,9 +15,8 @@ def add(commands: Commands) -> None:
     train = commands.add_parser("train", help="train a follower in the batch of worlds")
     train.add_argument(
         "recipe",
-        choices=("ppo", "ppo_estimate", "ppo_pixels", "recurrent_ppo", "sac"),
         metavar="ALGO",
-        help="%(choices)s",
+        help="`follow list recipes`, or module:object",
     )
     train.add_argument("--steps", type=positive, metavar="N", help="environment steps (default: the recipe's)")
     add_seed(train)
@@ -27,16 +26,19 @@ def add(commands: Commands) -> None:
 
 
 def _run(parsed: argparse.Namespace) -> None:
-    from baselines.learned.recipes import RECIPES
+    from baselines.learned.recipes import find_recipe
+
+    with bad_input(ValueError):
+        name, recipe = find_recipe(parsed.recipe)
+    need("stable_baselines3", "learn", "trainings")
     from baselines.learned.training import train
 
-    recipe = RECIPES[parsed.recipe]
-    out = parsed.out or Path("results", "learned", f"{parsed.recipe}-{parsed.seed}")
+    out = parsed.out or Path("results", "learned", f"{name}-{parsed.seed}")
     try:
         with bad_input(ValueError):
             if parsed.steps is not None:
                 recipe = dataclasses.replace(recipe, steps=parsed.steps)
-            weights = train(parsed.recipe, recipe, parsed.seed, out, parsed.resume)
+            weights = train(name, recipe, parsed.seed, out, parsed.resume)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
             f"interrupted: the finished legs are kept in {out}; the same command with --resume goes on."

@@ -14,12 +14,17 @@ import numpy as np
 
 from baselines.followers.calibration import noise_model
 from baselines.followers.networks import ACTIVATIONS, Arrays, Memory, Network
-from baselines.learned.recipes import CONTROL_HZ, ENVIRONMENT, OBSERVATIONS
 from follow_env.registry import choose
 from tracker.estimators import AdaptiveKalmanFilter, Estimate, Estimator
 from tracker.estimators.base import Pair
 
 SUFFIX = ".safetensors"
+ENVIRONMENT = "follow_env/*-v0"
+"""The environments' version that agents are trained for."""
+CONTROL_HZ = 30
+"""Rate at which agents learn and drive."""
+OBSERVATIONS = ("measurement", "estimate", "rgbd_uint8")
+"""What an agent sees: the tracker's report, the adaptive Kalman filter's estimate of it, or the picture."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +36,7 @@ class Card:
         recipe_sha256: digest of everything in the recipe.
         seed: of the training.
         steps: environment steps of the training, with those in which a teacher was cloned.
-        observation: one of `recipes.OBSERVATIONS`.
+        observation: one of `OBSERVATIONS`.
         activation: between dense layers.
         squash: whether tanh bounds the action.
         environment: ids and version that it was trained for.

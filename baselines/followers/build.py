@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from baselines.controllers import CONTROLLERS
-from baselines.followers.agents import Agent, load_agent, shipped
+from baselines.followers.agents import CONTROL_HZ, Agent, load_agent, shipped
 from baselines.followers.calibration import noise_model
 from baselines.followers.follower import Follower
 from baselines.followers.noise import noise_of
@@ -22,7 +22,6 @@ from baselines.followers.recovery import RECOVERIES
 from baselines.followers.references import POLICIES
 from baselines.followers.spec import FollowerSpec
 from baselines.followers.tracking_follower import TrackingFollower
-from baselines.learned.recipes import CONTROL_HZ
 from follow_env.config import CameraConfig, EnvConfig, RobotConfig
 from follow_env.geometry import CameraMount
 from follow_env.registry import Registry, choose

@@ -24,13 +24,13 @@ from baselines.benchmark.cells import ENVIRONMENT_IDS, SCENES
 from baselines.benchmark.files import write_csv, write_text
 from baselines.benchmark.provenance import machine, packages
 from baselines.benchmark.store import InputError
-from baselines.followers.agents import SUFFIX, Agent, Card, save_agent
+from baselines.followers.agents import CONTROL_HZ, SUFFIX, Agent, Card, save_agent
 from baselines.followers.calibration import noise_model
 from baselines.learned.adapter import FollowVecEnv
 from baselines.learned.cloning import clone_oracle
 from baselines.learned.evaluation import CURVE_COLUMNS, HELD_SEEDS, SCORES, evaluate
 from baselines.learned.models import load_model, make_model, policy_arrays
-from baselines.learned.recipes import CONTROL_HZ, Domain, PPORecipe, Recipe, SACRecipe
+from baselines.learned.recipes import Domain, PPORecipe, Recipe, SACRecipe
 from tracker.estimators.akf_batch import BatchFilter
 
 _CURVE, _CONFIG = "curve.csv", "config.json"
@@ -74,7 +74,7 @@ def train(
     """
     config = {
         "name": name,
-        "recipe": {"class": type(recipe).__name__, **dataclasses.asdict(recipe)},
+        "recipe": recipe.settings(),
         "domains": [dataclasses.asdict(domain) for domain in recipe.domains],
         "recipe_sha256": recipe.digest(),
         "seed": seed,
@@ -112,6 +112,7 @@ def train(
         **dataclasses.asdict(_agent(model, name, recipe, seed).card),
         "weights_sha256": hashlib.sha256(weights.read_bytes()).hexdigest(),
         "recipe_settings": config["recipe"],
+        "domains": config["domains"],
         "held_out": {"seeds": list(HELD_SEEDS), "scenes": list(SCENES), **{key: curve[-1][key] for key in SCORES}},
         "wall_s": curve[-1]["wall_s"],
         "machine": machine(),

@@ -9,7 +9,7 @@ import pytest
 from baselines.benchmark.store import InputError
 from baselines.followers.agents import load_agent
 from baselines.learned import training
-from baselines.learned.recipes import RECIPES, Recipe
+from baselines.learned.recipes import RECIPES, PPORecipe, Recipe, find_recipe
 from follow_env.envs.follow import FollowEnv
 
 SHORT = {
@@ -27,7 +27,7 @@ def _one_seed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def short(name: str) -> Recipe:
-    return dataclasses.replace(RECIPES[name], **SHORT[name])
+    return dataclasses.replace(RECIPES.get(name), **SHORT[name])
 
 
 def train(name: str, out: Path, **arguments: object) -> Path:
@@ -100,14 +100,27 @@ def test_a_folder_with_another_training_is_refused(tmp_path: Path) -> None:
 
 def test_a_recipe_checks_its_numbers() -> None:
     with pytest.raises(ValueError, match="worlds is 0; expected a whole number from 1"):
-        dataclasses.replace(RECIPES["ppo"], worlds=0)
+        dataclasses.replace(RECIPES.get("ppo"), worlds=0)
     with pytest.raises(ValueError, match="did you mean 'measurement'"):
-        dataclasses.replace(RECIPES["ppo"], observation="measurment")
+        dataclasses.replace(RECIPES.get("ppo"), observation="measurment")
 
 
 def test_the_digest_covers_the_domains(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = RECIPES["ppo"].digest()
-    assert before == RECIPES["ppo"].digest()
-    assert before != RECIPES["ppo_estimate"].digest()
-    monkeypatch.setattr("baselines.learned.recipes.DOMAINS", RECIPES["ppo"].domains[:1])
-    assert RECIPES["ppo"].digest() != before
+    before = RECIPES.get("ppo").digest()
+    assert before == RECIPES.get("ppo").digest()
+    assert before != RECIPES.get("ppo_estimate").digest()
+    monkeypatch.setattr("baselines.learned.recipes.base.DOMAINS", RECIPES.get("ppo").domains[:1])
+    assert RECIPES.get("ppo").digest() != before
+
+
+def test_a_recipe_is_found_by_its_name_or_its_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "my_recipes.py").write_text(
+        "from baselines.learned.recipes import PPORecipe\nshort = PPORecipe(steps=1000)\nlong = 7\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    assert find_recipe("ppo") == ("ppo", RECIPES.get("ppo"))
+    assert find_recipe("my_recipes:short") == ("short", PPORecipe(steps=1000))
+    with pytest.raises(ValueError, match="'my_recipes:long' is int; expected a Recipe"):
+        find_recipe("my_recipes:long")
+    with pytest.raises(ValueError, match="did you mean 'sac'"):
+        find_recipe("sack")

@@ -1,21 +1,16 @@
-"""How each follower is trained: one frozen, typed recipe per algorithm, and the domains they are trained in."""
+"""`Recipe`: how a follower is trained, as data; the domains it is trained in; and the registry of recipes."""
 
 from __future__ import annotations
 
 import dataclasses
 import hashlib
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from follow_env.registry import choose
-
-ENVIRONMENT = "follow_env/*-v0"
-"""The environments' version that agents are trained for."""
-CONTROL_HZ = 30
-"""Rate at which agents learn and drive."""
-OBSERVATIONS = ("measurement", "estimate", "rgbd_uint8")
-"""What an agent sees: the tracker's report, the adaptive Kalman filter's estimate of it, or the picture."""
+from baselines.followers.agents import ENVIRONMENT, OBSERVATIONS
+from follow_env.registry import Registry, choose
 
 
 @dataclass(frozen=True)
@@ -90,86 +85,42 @@ class Recipe:
         """Where it is trained: pictures are too dear for many domains."""
         return PLAIN_DOMAINS if self.observation == "rgbd_uint8" else DOMAINS
 
+    def settings(self) -> dict[str, Any]:
+        """Return every number of the recipe, and its class; JSON-able, as cards carry it."""
+        return {"class": type(self).__name__, **dataclasses.asdict(self)}
+
     def digest(self) -> str:
         """Return a hash of the recipe's and the domains' numbers; the code of the training is not in it."""
-        content = {"recipe": type(self).__name__, **dataclasses.asdict(self), "environment": ENVIRONMENT}
-        content["domains"] = [dataclasses.asdict(domain) for domain in self.domains]
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        return recipe_digest(self.settings(), [dataclasses.asdict(domain) for domain in self.domains], ENVIRONMENT)
 
 
-@dataclass(frozen=True)
-class PPORecipe(Recipe):
-    """Proximal policy optimization (Schulman et al., 2017).
+def recipe_digest(settings: Mapping[str, Any], domains: Sequence[Mapping[str, Any]], environment: str) -> str:
+    """Return the hash of a recipe as a card carries it, whatever the recipe of that name says today.
 
-    Attributes:
-        rollout: steps of each world between updates.
-        minibatch: samples of a gradient step.
-        epochs: passes over a rollout.
-        gae_lambda: of the generalized advantage estimate.
-        clip_range: of the probability ratio.
-        initial_log_std: logarithm of the action's standard deviation at the start.
-        cloned_pictures: pictures from which the policy learns the oracle's actions before; 0 = none.
+    Args:
+        settings: what `Recipe.settings` returned.
+        domains: records of the `Domain`s.
+        environment: ids and version that were trained in.
     """
-
-    rollout: int = 128
-    minibatch: int = 2048
-    epochs: int = 8
-    gae_lambda: float = 0.95
-    clip_range: float = 0.2
-    initial_log_std: float = -0.7
-    cloned_pictures: int = 0
+    content = {**settings, "recipe": settings["class"], "environment": environment, "domains": list(domains)}
+    del content["class"]
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-@dataclass(frozen=True)
-class RecurrentPPORecipe(PPORecipe):
-    """PPO with an LSTM between observation and dense layers.
+RECIPES: Registry[Recipe] = Registry("recipe", "baselines.learned.recipes")
+"""Recipes by the name that `follow train` takes; each is registered in its own file."""
 
-    Attributes:
-        memory: units of the LSTM.
+
+def find_recipe(recipe: str) -> tuple[str, Recipe]:
+    """Return what the agents of a recipe are called, and the recipe.
+
+    Args:
+        recipe: a registered name, or `"module:object"`.
+
+    Raises:
+        ValueError: for an unknown name (the nearest is named), or what is no recipe.
     """
-
-    memory: int = 32
-
-
-@dataclass(frozen=True)
-class SACRecipe(Recipe):
-    """Soft actor-critic (Haarnoja et al., 2018).
-
-    Attributes:
-        minibatch: samples of a gradient step.
-        updates: gradient steps after each step of all worlds.
-        buffer: transitions that are remembered.
-        warm_up: steps with random actions before the first update.
-        tau: share by which the target network follows.
-    """
-
-    steps: int = 1_500_000
-    worlds: int = 40
-    learning_rate: float = 7e-4
-    minibatch: int = 512
-    updates: int = 2
-    buffer: int = 500_000
-    warm_up: int = 10_000
-    tau: float = 0.01
-
-
-RECIPES: dict[str, Recipe] = {
-    "ppo": PPORecipe(),
-    "ppo_estimate": PPORecipe(observation="estimate"),
-    "ppo_pixels": PPORecipe(
-        observation="rgbd_uint8",
-        steps=240_000,
-        worlds=32,
-        legs=4,
-        learning_rate=2e-4,
-        rollout=128,
-        minibatch=512,
-        epochs=4,
-        clip_range=0.1,
-        initial_log_std=-1.6,
-        cloned_pictures=40_000,
-    ),
-    "recurrent_ppo": RecurrentPPORecipe(steps=4_000_000),
-    "sac": SACRecipe(),
-}
-"""Recipe by the name that `follow train` takes."""
+    found = RECIPES.get(recipe)
+    if not isinstance(found, Recipe):
+        raise ValueError(f"recipe {recipe!r} is {type(found).__name__}; expected a Recipe")
+    return recipe.rpartition(":")[2], found

@@ -128,6 +128,11 @@ def _parse_text(text: str) -> FollowerSpec:
     from baselines.followers.references import POLICIES
     from tracker.estimators.base import ESTIMATORS
 
+    if text.lstrip().startswith("{"):
+        try:
+            return FollowerSpec.parse(json.loads(text))
+        except json.JSONDecodeError as error:
+            raise ValueError(f"follower {text!r} is no JSON ({error}); expected a mapping of parts") from error
     if text in POLICIES:
         return FollowerSpec(policy=text, kind="reference")
     if text in shipped():

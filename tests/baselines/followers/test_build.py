@@ -66,6 +66,7 @@ def drive(follower, env, steps=None, seed=0):
         ("mask/kf", ("mask", "kf", "pi")),
         ("truth/none+pi", ("truth", "none", "pi")),
         ("akf+my_lab:lqr", ("emulated", "akf", "my_lab:lqr")),
+        ('{"estimator": "kf"}', ("emulated", "kf", "pi")),
         ("emulated/my_lab:ekf+pi", ("emulated", "my_lab:ekf", "pi")),
     ],
 )
@@ -86,6 +87,7 @@ def test_a_text_names_the_parts(text, parts):
         ("akf+pid", ("'pid'", "did you mean 'pi'")),
         ({"estimater": "kf"}, ("'estimater'", "did you mean 'estimator'")),
         (3, ("3", "predict")),
+        ("{kf}", ("{kf}", "no JSON")),
     ],
 )
 def test_what_names_nothing_is_one_clear_error(value, words):

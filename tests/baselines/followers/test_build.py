@@ -74,7 +74,7 @@ def test_a_text_names_the_parts(text, parts):
     spec = FollowerSpec.parse(text)
     assert (spec.perception, spec.estimator, spec.controller) == parts
     assert spec.policy is None
-    assert spec.kind == ("own" if ":" in text else "classical")
+    assert spec.kind == ("own" if "my_lab" in text else "classical")
     assert FollowerSpec.parse(json.loads(json.dumps(spec.to_json()))) == spec
 
 

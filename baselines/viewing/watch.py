@@ -65,8 +65,10 @@ def watch(
     view = None if size is None else _make_view(renderer, env.scene, env.camera.config, size, shadows)
     title = title_of(played)
     dashboard = Dashboard(env.scene, env.camera, env.config.robot.camera_forward, title)
-    observation, info = env.reset(seed=seed)
     policy, state = policy_of(played, env, picture_size), None
+    observation, info = env.reset(seed=seed)
+    if not env.domain.is_fixed:
+        policy = policy_of(played, env, picture_size)  # the episode has drawn the robot, the sensor, ...
     small: list[np.ndarray] = []
     with contextlib.ExitStack() as parts:
         writer = parts.enter_context(VideoWriter(video, round(1.0 / env.dt)))
